@@ -84,6 +84,37 @@ fn conditions_and_choices_work_on_scores() {
 }
 
 #[test]
+fn scores_of_data_frames_are_read() {
+    let folder = two_files();
+    let at = folder.path();
+    score(at, &["a.parquet"], "s.csv");
+    let expected = run(at, &["score", "s.csv"]).done();
+    let good = fs::read_to_string(at.join("s.csv")).unwrap();
+    let whole = |cell: &str| cell.parse::<i64>().map_or_else(|_| cell.to_owned(), |number| format!("{number}.0"));
+    let row = |(at, line): (usize, &str)| match at {
+        0 => format!(",{line}\n"),
+        _ => format!("{},{}\n", at - 1, line.split(',').map(whole).collect::<Vec<_>>().join(",")),
+    };
+    let frame: String = good.lines().enumerate().map(row).collect();
+    fs::write(at.join("frame.csv"), &frame).unwrap();
+    assert_eq!(run(at, &["score", "frame.csv"]).done(), expected);
+    let header: Vec<&str> = good.lines().next().unwrap().split(',').collect();
+    let tsa = header.iter().position(|name| *name == "TSA").unwrap();
+    let truth = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        cells[tsa] = match cells[tsa] {
+            "1" => "True",
+            "0" => "False",
+            other => other,
+        };
+        cells.join(",") + "\n"
+    };
+    fs::write(at.join("truth.csv"), good.lines().map(truth).collect::<String>()).unwrap();
+    assert_eq!(run(at, &["score", "truth.csv"]).done(), expected);
+    run(at, &["report", "frame.csv", "--out", "frame"]).done();
+}
+
+#[test]
 fn impossible_scores_are_refused() {
     let folder = two_files();
     let at = folder.path();
@@ -97,7 +128,7 @@ fn impossible_scores_are_refused() {
         (with("new,ant,E1,1,1,7,3,1,,0,1,0,1,0,1"), ["`TSA`", "found 7"]),
         (with("new,ant,E1,1,1,-1,3,1,,0,1,0,1,0,1"), ["`TSA`", "found -1"]),
         (with("new,ant,E1,1,1,yes,3,1,,0,1,0,1,0,1"), ["line 10, column `TSA`", "an integer"]),
-        (with("new,ant,E1,1,1,1.0,3,1,,0,1,0,1,0,1"), ["line 10, column `TSA`", "1.0"]),
+        (with("new,ant,E1,1,1,1.5,3,1,,0,1,0,1,0,1"), ["line 10, column `TSA`", "1.5"]),
         (with("new,ant,E1,x,1,1,3,1,,0,1,0,1,0,1"), ["line 10, column `seed`", "an integer"]),
         (with(",ant,E1,1,1,1,3,1,,0,1,0,1,0,1"), ["line 10, column `episode_id`", "a value"]),
         (with("new,ant,E9,1,1,1,3,1,,0,1,0,1,0,1"), ["`E9`", "E1, E2, E3, E4, E5"]),

@@ -2,10 +2,10 @@
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// The type of an expression. Integers are 64-bit, floats IEEE doubles whose NaN equals itself and exceeds every number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Type {
     /// True, false or null.
@@ -54,6 +54,8 @@ pub struct Columns {
     values: IndexMap<String, Vec<String>>,
     /// Columns of the schema that have a meaning only in the domain of the mirror.
     of_mirror: Vec<String>,
+    /// Columns that hold only nulls in the traces, of no type.
+    null: Vec<String>,
     stranger: Option<&'static str>,
 }
 
@@ -152,6 +154,16 @@ impl Columns {
         if !self.schema.contains_key(&name) {
             self.own.insert(name, column);
         }
+    }
+
+    /// Sets a column outside the schema that holds only nulls: it fits any declared type, and is text otherwise.
+    pub fn set_null(&mut self, name: &str) {
+        self.set_own(name, Column { ty: Type::Text, level: Level::Step });
+        self.null.push(name.to_owned());
+    }
+
+    pub(crate) fn is_null(&self, name: &str) -> bool {
+        self.null.iter().any(|null| null == name)
     }
 
     pub(crate) fn set_own_values(&mut self, name: &str, values: &[String]) {

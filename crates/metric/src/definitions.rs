@@ -221,7 +221,8 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
             faults.push(
                 Fault::new(place.clone(), message).help("remove the declaration: `mirrorstats trace schema` has it"),
             );
-        } else if let Some(found) = columns.get(name).filter(|found| found.ty != declared.ty) {
+        } else if let Some(found) = columns.get(name).filter(|found| found.ty != declared.ty && !columns.is_null(name))
+        {
             let (declared, found) = (declared.ty.name(), found.ty.name());
             let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
             faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));

@@ -51,7 +51,10 @@ pub fn trace_columns(traces: &TraceSet) -> Columns {
         columns.forget(column.name);
     }
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
-        if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
+        let found = traces.column(name);
+        if found.as_ref().is_some_and(|column| column.is_null) {
+            columns.set_null(name);
+        } else if let Some(ty) = found.and_then(|column| type_of(column.kind)) {
             columns.set_own(name, Column { ty, level: Level::Step });
         }
     }
@@ -69,6 +72,13 @@ fn type_of(kind: Kind) -> Option<Type> {
         Kind::String => Some(Type::Text),
         Kind::Unsupported => None,
     }
+}
+
+/// The type of a column of the traces; a column of nulls has the declared one. `None` if no trace has it.
+pub fn kind_in(traces: &TraceSet, declared: &[DeclaredColumn], name: &str) -> Option<Kind> {
+    let found = traces.column(name)?;
+    let declared = declared.iter().find(|column| found.is_null && column.name == name);
+    Some(declared.map_or(found.kind, |column| column.kind))
 }
 
 /// Checks that every column that is read is in every file, with one type.

@@ -113,6 +113,12 @@ pub enum StudyError {
     )]
     NotScored { experiment: String, definitions: String, own: String },
     #[error(
+        "expected traces that carry the same definitions, found `{}` in {} and `{}` in {}\n  \
+         help: name the definitions for all of them with --definitions, or give the files one by one",
+        .names[0], .files[0], .names[1], .files[1]
+    )]
+    CarriedDefinitionsDiffer { files: [String; 2], names: [String; 2] },
+    #[error(
         "`{file}` has no column of the domain `mirror`: expected definitions of its own domain, found `{definitions}`\n  \
          help: give --definitions a file with `domain = \"NAME\"` and a `[column.NAME]` for each column that it reads"
     )]

@@ -6,7 +6,9 @@ use engines::polars::shared_file::in_memory;
 use engines::polars::statement::{self, Checked, Table};
 use engines::polars::tables;
 use polars::prelude::LazyFrame;
+use score::vocabulary::declared_columns;
 use toml_spec::Faults;
+use trace::schema::DeclaredColumn;
 
 use super::{Study, StudyError};
 
@@ -16,7 +18,7 @@ impl Study {
     pub fn query(&self, query: &Checked) -> Result<(LazyFrame, Option<String>), StudyError> {
         let (mut loaded, mut note) = (Vec::new(), None);
         if query.tables.contains(&Table::Steps) {
-            loaded.push((Table::Steps, tables::steps(self.traces()?)?));
+            loaded.push((Table::Steps, tables::steps(self.traces()?, &self.declared_columns())?));
         }
         if query.tables.contains(&Table::Episodes) || query.tables.contains(&Table::Cells) {
             let scores = self.score()?.episodes;
@@ -75,6 +77,12 @@ impl Study {
             option("--metrics", question.metrics.as_ref().map(|names| names.join(","))),
             option("--where", question.filter.clone()),
         )
+    }
+
+    /// The columns that the definitions declare; none if the definitions do not fit the traces.
+    fn declared_columns(&self) -> Vec<DeclaredColumn> {
+        let definitions = self.traces().and_then(|traces| self.question.bind(traces));
+        definitions.map(|definitions| declared_columns(&definitions)).unwrap_or_default()
     }
 
     /// The rows of a query as a Parquet file in memory. Errors: a query that cannot be run; faults of the inputs.

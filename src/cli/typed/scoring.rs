@@ -30,7 +30,9 @@ impl TraceArgs {
 
     /// Opens the files as a study with these questions.
     pub fn study(&self, scoring: &ScoringArgs, grouping: &GroupingArgs) -> Result<Study, Failure> {
-        Ok(self.open()?.asked(scoring.question(grouping))?)
+        let study = self.open()?.asked(scoring.question(grouping))?;
+        output::notes(study.carried_note().as_slice());
+        Ok(study)
     }
 
     /// Like [`TraceArgs::study`], scored by the requested engine.

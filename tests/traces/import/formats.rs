@@ -130,7 +130,7 @@ fn parquet_of_any_shape_is_mapped() {
     assert_eq!(queried(at, "episode_id, t, x, success"), ["e,1,2.0,false", "e,2,2.0,true"]);
     fs::write(at.join("rows.parquet"), "PAR1 and no more").unwrap();
     let told = run(at, &import("rows.parquet", &SET)).refused();
-    assert!(told.contains("rows.parquet\n  expected a Parquet file"), "{told}");
+    assert!(told.contains("rows.parquet\n  expected a footer at the end, closed with `PAR1`"), "{told}");
 }
 
 #[test]
@@ -215,7 +215,10 @@ fn the_folder_of_a_lerobot_data_set_is_imported_with_its_tasks() {
     assert!(told.contains("found 8 fewer"), "{told}");
     fs::write(&frames, "PAR1").unwrap();
     let told = run(at, &import("pusht", &SET)).refused();
-    assert!(told.contains("pusht/data/chunk-000/file-000.parquet\n  expected a Parquet file"), "{told}");
+    assert!(
+        told.contains("pusht/data/chunk-000/file-000.parquet\n  expected a footer at the end, closed with `PAR1`"),
+        "{told}"
+    );
     let info = at.join("other/meta/info.json");
     let text = fs::read_to_string(&info).unwrap().replace("v3.0", "v2.1");
     fs::write(&info, text).unwrap();

@@ -8,6 +8,7 @@ mod inspect_samples;
 mod palette;
 mod refusals;
 mod round_trip;
+mod tables;
 
 use std::borrow::Borrow;
 use std::fs;

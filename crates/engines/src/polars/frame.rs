@@ -54,7 +54,15 @@ impl FrameColumn {
 
     fn of(&self, file: &TraceFile) -> Expr {
         let present = file.column(&self.name).is_some_and(|column| column.kind.is_some());
-        let values = if present { col(self.name.as_str()) } else { lit(NULL) };
+        let values = match file.folder(&self.name) {
+            Some(folder) => match folder.value().map(|text| (text, text.parse::<i64>())) {
+                Some((_, Ok(number))) if folder.column.kind == Some(Kind::Int) => lit(number),
+                Some((text, _)) => lit(text.to_owned()),
+                None => lit(NULL),
+            },
+            None if present => col(self.name.as_str()),
+            None => lit(NULL),
+        };
         values.strict_cast(self.data_type()).alias(self.name.as_str())
     }
 }

@@ -16,6 +16,7 @@ use metric::sql::{self, Dialect};
 use score::builder::TableBuilder;
 use score::score_traces::unscored;
 use score::table::{EpisodeKey, EpisodeTable, Header, MetricColumn};
+use score::vocabulary::{declared_columns, kind_in};
 use trace::open::{TraceFile, TraceSet};
 use trace::scan::EPISODE_COLUMNS;
 
@@ -46,7 +47,8 @@ fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
             names.push(name);
         }
     }
-    let wide = |name: &str| FrameColumn::wide(name, traces.column(name)?.kind);
+    let declared = declared_columns(definitions);
+    let wide = |name: &str| FrameColumn::wide(name, kind_in(traces, &declared, name)?);
     names.into_iter().filter_map(wide).collect()
 }
 

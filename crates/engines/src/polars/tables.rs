@@ -8,10 +8,13 @@ use exact::moments::Moments;
 use report::cells::{Cell, Cells, KeyValue};
 use score::select::{is_of_coders, truths_of};
 use score::table::{EpisodeTable, KeyRef, MetricColumn};
+use score::vocabulary::kind_in;
 use trace::open::TraceSet;
+use trace::schema::DeclaredColumn;
 
-/// The steps of all files with all their columns; an absent column is null.
-pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
+/// The steps of all files with all their columns; an absent column is null, and a column of nulls has its
+/// declared type.
+pub fn steps(traces: &TraceSet, declared: &[DeclaredColumn]) -> Result<LazyFrame, PolarsError> {
     let mut columns = Vec::new();
     for name in traces.column_names() {
         let Some(found) = traces.column(name) else { continue };
@@ -19,7 +22,8 @@ pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
             let problem = format!("`{name}` is {} in `{first}` and {} in `{second}`", a.name(), b.name());
             return Err(PolarsError::Failed(format!("{problem}; write it with one type in all traces")));
         }
-        columns.extend(FrameColumn::natural(traces, name, found.kind));
+        let kind = kind_in(traces, declared, name).unwrap_or(found.kind);
+        columns.extend(FrameColumn::natural(traces, name, kind));
     }
     frame::steps(traces, &columns)
 }

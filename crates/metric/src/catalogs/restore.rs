@@ -3,12 +3,12 @@
 //! Rule: the restored definitions are exactly the original ones, or restoring fails: the content hash decides. Columns
 //! that a file declared are not in the catalog; the columns of the traces replace them.
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use crate::catalog::Catalog;
-use crate::columns::Columns;
+use crate::columns::{Columns, Level};
 use crate::definitions::Definitions;
-use crate::file::FileError;
+use crate::file::{ColumnEntry, FileError};
 
 #[derive(Debug, thiserror::Error)]
 pub enum RestoreError {
@@ -36,6 +36,26 @@ impl Definitions {
     }
 }
 
+impl Definitions {
+    /// The definitions as one file, with what they include and the columns that they declare, for a trace that carries
+    /// them. [`Definitions::from_toml`] reads it.
+    pub fn as_one_file(&self) -> String {
+        let column = |(name, entry): (&str, &ColumnEntry)| {
+            let is_constant = entry.column.level == Level::Episode;
+            let shape = json!({ "type": entry.column.ty, "constant": is_constant, "values": entry.values,
+                "unit": entry.unit, "help": entry.help });
+            (name.to_owned(), shape)
+        };
+        let columns: Map<String, Value> = self.declared_columns().map(column).collect();
+        let columns = if columns.is_empty() { String::new() } else { text(&json!({ "column": columns })) };
+        format!("{}\n{columns}", as_file(&self.catalog))
+    }
+}
+
+fn text(root: &Value) -> String {
+    toml::to_string(root).expect("a catalog without nulls holds texts, integers, lists and maps with text keys")
+}
+
 fn as_file(catalog: &Catalog) -> String {
     let mut root = serde_json::json!(catalog.without_declared());
     drop_keys(&mut root, &["name", "hash"]);
@@ -48,7 +68,7 @@ fn as_file(catalog: &Catalog) -> String {
         }
     }
     drop_nulls(&mut root);
-    toml::to_string(&root).expect("a catalog without nulls holds texts, integers, lists and maps with text keys")
+    text(&root)
 }
 
 fn entries<'v>(value: &'v mut Value, key: &str) -> impl Iterator<Item = &'v mut Value> {

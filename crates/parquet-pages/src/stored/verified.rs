@@ -143,7 +143,10 @@ impl Verified {
         {
             return Err(self.fault(offset, expected, found));
         }
-        self.store.expansion.page(self.place, offset, header.whole).map_err(|exceeded| self.over(offset, &exceeded))?;
+        // A run of a few bytes may stand for millions of items of lists, which no count of rows bounds.
+        let items = if self.flat { 0 } else { header.values.saturating_mul(size_of::<u64>()) };
+        let inflated = header.whole.max(items);
+        self.store.expansion.page(self.place, offset, inflated).map_err(|exceeded| self.over(offset, &exceeded))?;
         progress.pages += 1;
         if matches!(header.kind, Kind::Data | Kind::DataV2) {
             progress.values += header.values;

@@ -49,13 +49,28 @@ fn io(error: csv::Error) -> FormatError {
 pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
     let mut reader = csv::Reader::from_reader(input);
     let header: Vec<String> = reader.headers().map_err(|error| line_fault(&error))?.iter().map(str::to_owned).collect();
-    let mut rows = Vec::new();
+    let mut rows: Vec<Vec<Option<String>>> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| line_fault(&error))?;
         rows.push(record.iter().map(|cell| Some(cell.to_owned())).collect());
     }
+    let (header, rows) = without_index(header, rows);
     // The header is line 1; without quoted line breaks, row i is line i + 2.
     assemble(catalog, &header, rows, 2)
+}
+
+/// The columns without the row numbers that pandas writes before them.
+fn without_index(
+    mut header: Vec<String>,
+    mut rows: Vec<Vec<Option<String>>>,
+) -> (Vec<String>, Vec<Vec<Option<String>>>) {
+    let is_number = |(at, row): (usize, &Vec<Option<String>>)| row[0].as_deref() == Some(&*at.to_string());
+    let is_unnamed = header.first().is_some_and(|name| name.is_empty() || name == "Unnamed: 0");
+    if is_unnamed && rows.iter().enumerate().all(is_number) {
+        header.remove(0);
+        rows.iter_mut().for_each(|row| drop(row.remove(0)));
+    }
+    (header, rows)
 }
 
 fn line_fault(error: &csv::Error) -> FormatError {
@@ -154,8 +169,17 @@ fn required<'a>(cell: Option<&'a str>, line: usize, column: &str) -> Result<&'a 
     })
 }
 
+/// An integer as data frames write it: `1.0` beside missing values, and `True` or `False`.
 fn integer<T: std::str::FromStr>(text: &str, line: usize, column: &str) -> Result<T, FormatError> {
-    text.parse().map_err(|_| FormatError::Value {
+    let whole = match text {
+        "True" | "true" => "1",
+        "False" | "false" => "0",
+        text => text
+            .split_once('.')
+            .filter(|(_, zeros)| zeros.bytes().all(|zero| zero == b'0'))
+            .map_or(text, |(whole, _)| whole),
+    };
+    whole.parse().map_err(|_| FormatError::Value {
         line,
         column: column.to_owned(),
         expected: "an integer",

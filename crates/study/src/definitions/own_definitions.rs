@@ -12,9 +12,10 @@ use metric::columns::Columns;
 use metric::definitions::Definitions;
 use metric::file;
 use score::table::EpisodeTable;
+use serde::Deserialize;
 use trace::declared_experiment::DeclaredExperiment;
 use trace::open::{TraceFile, TraceSet};
-use trace::schema::Domain;
+use trace::schema::{Domain, RECORDING_KEY};
 
 /// Experiments that the same definitions score.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,6 +32,42 @@ impl ScoredAlike {
     pub(crate) fn is_built_in(&self) -> bool {
         self.hash.is_none() && file::built_in(&self.definitions).is_some()
     }
+}
+
+/// Definitions that traces carry, since they were imported with them.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct Carried {
+    pub(crate) name: String,
+    pub(crate) text: String,
+}
+
+impl Carried {
+    pub(crate) fn of(definitions: &Definitions) -> Self {
+        Self { name: definitions.catalog.name.clone(), text: definitions.as_one_file() }
+    }
+
+    fn of_file(file: &TraceFile) -> Option<Self> {
+        // Most recordings carry none, and are long.
+        let has = |text: &str| text.contains("\"definitions\":{\"name\"");
+        file.metadata_value(RECORDING_KEY).filter(|text| has(text))?;
+        serde_json::from_value(file.recording()["definitions"].clone()).ok()
+    }
+}
+
+/// The definitions that these traces carry; `None` if no trace carries any.
+fn carried(traces: &TraceSet) -> Result<Option<Carried>, StudyError> {
+    let mut found: Option<(&TraceFile, Carried)> = None;
+    for file in traces.files() {
+        match (Carried::of_file(file), &found) {
+            (Some(own), Some((first, known))) if own != *known => {
+                let files = [first.name(), file.name()].map(str::to_owned);
+                return Err(StudyError::CarriedDefinitionsDiffer { files, names: [known.name.clone(), own.name] });
+            }
+            (Some(own), None) => found = Some((file, own)),
+            _ => {}
+        }
+    }
+    Ok(found.map(|(_, carried)| carried))
 }
 
 /// The definitions of reaching, whose traces have no colours.
@@ -105,6 +142,10 @@ fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
 impl Question {
     /// Fills in the definitions that the experiments of these traces name, unless the question requests others.
     pub fn resolved(mut self, traces: &TraceSet) -> Result<Self, StudyError> {
+        self.carried = if self.definitions.is_none() { carried(traces)? } else { None };
+        if self.carried.is_some() {
+            return Ok(self);
+        }
         if traces.domain() == Domain::Own {
             check_domain(self.definitions_name(), traces)?;
         }
@@ -128,7 +169,10 @@ impl Question {
             let whole = side_by_side(&self.parts, columns)?;
             return whole.ok_or_else(|| StudyError::DefinitionsDiffer { groups: self.parts.clone() });
         }
-        Ok(Definitions::load(self.definitions_name(), columns)?)
+        Ok(match &self.carried {
+            Some(Carried { name, text }) => Definitions::from_toml(name, text, columns)?,
+            None => Definitions::load(self.definitions_name(), columns)?,
+        })
     }
 }
 
@@ -189,5 +233,11 @@ impl Study {
 
     pub fn definitions_name(&self) -> &Path {
         self.question.definitions_name()
+    }
+
+    /// A note if the definitions are those that the traces carry.
+    pub fn carried_note(&self) -> Option<String> {
+        let carried = self.question.carried.as_ref()?;
+        Some(format!("the definitions `{}` are those that the traces carry; --definitions names others", carried.name))
     }
 }

@@ -11,7 +11,7 @@ use trace::open::TraceSet;
 
 use crate::StudyError;
 use crate::losses::LostAs;
-use crate::own_definitions::ScoredAlike;
+use crate::own_definitions::{Carried, ScoredAlike};
 
 /// Labels of each episode's recording that scores carry if the traces have them.
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
@@ -25,6 +25,8 @@ pub struct Question {
     /// True to score experiments that need different definitions each by their own; false to refuse them.
     pub each: bool,
     pub parts: Vec<ScoredAlike>,
+    /// The definitions that the traces carry, if none are requested.
+    pub carried: Option<Carried>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub filter: Option<String>,
     /// The metrics wanted, by name; all if absent.
@@ -39,7 +41,8 @@ pub struct Question {
 
 impl Question {
     pub(crate) fn definitions_name(&self) -> &Path {
-        self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
+        let carried = || self.carried.as_ref().map_or(DEFAULT_DEFINITIONS, |carried| &carried.name);
+        self.definitions.as_deref().unwrap_or_else(|| Path::new(carried()))
     }
 
     pub(crate) fn labels(&self) -> Vec<String> {

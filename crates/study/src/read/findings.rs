@@ -6,9 +6,11 @@ use std::path::Path;
 
 use crate::StudyError;
 use crate::experiment_findings::experiment_findings;
+use crate::own_definitions::Carried;
 use exact::escape::visible;
 use exact::format::counted;
 use metric::definitions::Definitions;
+use metric::file;
 use score::vocabulary::{declared_columns, schema_columns};
 use trace::checksums::Checksums;
 use trace::diagnostic::Severity;
@@ -23,15 +25,19 @@ pub(crate) struct ExpectedTraces {
     /// The name of their domain; `None` for the mirror's.
     pub(crate) domain: Option<String>,
     pub(crate) declared: Vec<DeclaredColumn>,
+    /// Their name and text, if they are not built in.
+    pub(crate) carried: Option<Carried>,
 }
 
 impl ExpectedTraces {
-    pub(crate) fn of(definitions: &Path) -> Result<Self, StudyError> {
-        let definitions = Definitions::load(definitions, &schema_columns())?;
+    pub(crate) fn of(name: &Path) -> Result<Self, StudyError> {
+        let definitions = Definitions::load(name, &schema_columns())?;
+        let is_built_in = name.to_str().is_some_and(|name| file::built_in(name).is_some());
+        let carried = (!is_built_in).then(|| Carried::of(&definitions));
         let declared = declared_columns(&definitions);
         let catalog = definitions.catalog;
         let experiments = (!catalog.open).then(|| catalog.experiment.keys().cloned().collect());
-        Ok(Self { experiments, domain: catalog.domain, declared })
+        Ok(Self { experiments, domain: catalog.domain, declared, carried })
     }
 
     pub(crate) fn as_expected(&self) -> Expected<'_> {

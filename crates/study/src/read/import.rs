@@ -68,6 +68,7 @@ pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAns
         expected: expected.as_expected(),
         domain: expected.domain.as_deref(),
         palette: palette.as_ref(),
+        definitions: expected.carried.as_ref().map(|carried| (&*carried.name, &*carried.text)),
         cluster: request.clusters_by_seed.then_some(Cluster::Seed),
         is_reconstruction: request.reconstruction,
     };

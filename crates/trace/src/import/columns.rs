@@ -5,9 +5,9 @@
 
 use indexmap::IndexMap;
 
-use super::Limits;
 use super::error::{Fault, Place};
-use super::line::{LineValue, Members};
+use super::line::{self, LineValue, Members};
+use super::{Limits, cell};
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use crate::schema::{COLUMNS, Column, Kind, Stored};
 use exact::suggest::nearest;
@@ -30,6 +30,8 @@ struct Inferred {
     kind: Option<Kind>,
     /// The location of the first value that is not null.
     first: Option<Place>,
+    /// True if a value has a type of its own, which cells of CSV must fit.
+    is_typed: bool,
     wide: Option<(Place, i64)>,
 }
 
@@ -37,9 +39,58 @@ struct Inferred {
 const MOST_OWN: usize = 1000;
 /// 64-bit floats represent every integer up to this one.
 const EXACT: u64 = 1 << 53;
+const ABSENT: &str = "leave the cell empty, or write null, where there is no value; write infinities as Parquet";
 const SEE: &str = "`mirrorstats trace schema step` prints what a step may hold";
 
 impl Columns {
+    /// The values with the types that the schema or the definitions give their columns: cells of CSV, and whole numbers
+    /// with a point, which data frames write beside missing values.
+    ///
+    /// Columns in the names of folders are added; a different value in the row is a fault.
+    pub(super) fn typed(&self, members: Members, folders: &Members, limits: Limits<'_>) -> (Members, Option<Fault>) {
+        let mut members = self.with_types(members, limits);
+        let mut fault = None;
+        for (key, value) in self.with_types(folders.clone(), limits) {
+            match members.iter().find(|(name, _)| *name == key) {
+                None => members.push((key, value)),
+                Some((_, found)) if is_same(found, &value) => {}
+                Some((_, found)) => {
+                    let expected = format!("{}, as in the name of the folder `{key}=...`", value.shown());
+                    let help = "move the file to the folder of its values, or correct the column";
+                    fault = Some(Fault::new(expected, found.shown(), help).of_key(&key));
+                }
+            }
+        }
+        (members, fault)
+    }
+
+    fn with_types(&self, mut members: Members, limits: Limits<'_>) -> Members {
+        let Limits { expected, .. } = limits;
+        let declared = |key: &str| expected.declared.iter().find(|declared| declared.name == key);
+        for (key, value) in &mut members {
+            let known = expected.domain.column(key).map(|column| column.stored.kind());
+            let Some(kind) = known.or_else(|| Some(declared(key)?.kind)) else { continue };
+            match value {
+                LineValue::Cell(text) => *value = cell::typed(text, kind),
+                LineValue::Float(number) if kind == Kind::Int => {
+                    *value = line::whole(*number).map_or(LineValue::Float(*number), LineValue::Int);
+                }
+                _ => {}
+            }
+        }
+        members
+    }
+
+    /// The values with the types that all cells of their columns gave them.
+    pub(super) fn with_cells(&self, mut members: Members) -> Members {
+        for (key, value) in &mut members {
+            if let (LineValue::Cell(text), Some(Inferred { kind: Some(kind), .. })) = (&*value, self.own.get(key)) {
+                *value = cell::typed(text, *kind);
+            }
+        }
+        members
+    }
+
     /// Checks a line against the schema and against the lines before it.
     pub(super) fn check(&mut self, members: &Members, place: &Place, limits: Limits<'_>) -> Vec<Fault> {
         let mut faults = Vec::new();
@@ -102,18 +153,23 @@ impl Inferred {
     /// Adds a value; returns a fault if its type does not fit those before it.
     fn take(&mut self, kind: Option<Kind>, value: &LineValue, place: &Place) -> Option<Fault> {
         let now = kind?;
-        if let LineValue::Int(value) = value
-            && value.unsigned_abs() > EXACT
-            && self.wide.is_none()
-        {
-            self.wide = Some((place.clone(), *value));
+        let is_cell = matches!(value, LineValue::Cell(_));
+        if let Some(value) = integer(value).filter(|value| value.unsigned_abs() > EXACT && self.wide.is_none()) {
+            self.wide = Some((place.clone(), value));
         }
+        let are_cells = !self.is_typed && is_cell;
+        self.is_typed |= !is_cell;
         let Some((before, first)) = self.kind.zip(self.first.as_ref()) else {
             (self.kind, self.first) = (Some(now), Some(place.clone()));
             return None;
         };
         match (before, now) {
             (before, now) if before == now => None,
+            (Kind::String, _) if is_cell => None,
+            (before, now) if are_cells => {
+                self.kind = Some(cell::joined(before, now));
+                None
+            }
             (Kind::Int, Kind::Float) | (Kind::Float, Kind::Int) => {
                 self.kind = Some(Kind::Float);
                 None
@@ -123,6 +179,20 @@ impl Inferred {
                 Some(Fault::new(expected, value.shown(), "write the key with values of one type in all lines"))
             }
         }
+    }
+}
+
+/// Returns true if a value equals that of a folder's name, whose type may be unknown.
+fn is_same(value: &LineValue, folder: &LineValue) -> bool {
+    let cell = |text: &String| kind_of(value).ok().flatten().map(|kind| cell::typed(text, kind));
+    value == folder || matches!(folder, LineValue::Cell(text) if cell(text).as_ref() == Some(value))
+}
+
+fn integer(value: &LineValue) -> Option<i64> {
+    match value {
+        LineValue::Int(value) => Some(*value),
+        LineValue::Cell(text) => text.parse().ok(),
+        _ => None,
     }
 }
 
@@ -141,6 +211,7 @@ fn kind_of(value: &LineValue) -> Result<Option<Kind>, Box<Fault>> {
         LineValue::Int(_) => Ok(Some(Kind::Int)),
         LineValue::Float(_) => Ok(Some(Kind::Float)),
         LineValue::Text(_) => Ok(Some(Kind::String)),
+        LineValue::Cell(text) => Ok(Some(cell::kind_of(text))),
         LineValue::LargeInt(_) => {
             let expected = format!("an integer of at most {}", i64::MAX);
             Err(Box::new(Fault::new(expected, value.shown(), "write it as text in every line")))
@@ -177,6 +248,7 @@ fn misfit(column: &Column, value: &LineValue, limits: Limits<'_>) -> Option<Faul
             let rules = rules_of(column, Known { palette, experiments: expected.experiments });
             rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
         }
+        _ if is_absent(value) => refused(ABSENT),
         _ => refused(SEE),
     }
 }
@@ -188,10 +260,18 @@ fn misdeclared(key: &str, value: &LineValue, limits: Limits<'_>) -> Option<Fault
         (_, LineValue::Null)
             | (Kind::Bool, LineValue::Bool(_))
             | (Kind::Int, LineValue::Int(_))
-            | (Kind::Float, LineValue::Int(_) | LineValue::Float(_))
+            | (Kind::Float, LineValue::Float(_))
             | (Kind::String, LineValue::Text(_))
     );
     let help = "correct the value, or declare the column as the lines have it, under `[column.NAME]`";
+    if let (Kind::Float, LineValue::Int(number)) = (declared.kind, value) {
+        let expected = || format!("a number that 64-bit floats hold exactly, as the integers up to {EXACT}");
+        return (!is_exact(*number)).then(|| Fault::new(expected(), value.shown(), help));
+    }
+    if !is_of_kind && is_absent(value) {
+        let expected = format!("{}, as the definitions declare it, or null", named(declared.kind));
+        return Some(Fault::new(expected, value.shown(), ABSENT));
+    }
     if !is_of_kind {
         let expected = format!("{}, as the definitions declare it", named(declared.kind));
         return Some(Fault::new(expected, value.shown(), help));
@@ -204,6 +284,18 @@ fn misdeclared(key: &str, value: &LineValue, limits: Limits<'_>) -> Option<Fault
     (!is_known).then(|| Fault::new(expected(), value.shown(), near().unwrap_or_else(|| help.to_owned())))
 }
 
+/// Spellings of missing values in CSV of R, pandas and spreadsheets.
+fn is_absent(value: &LineValue) -> bool {
+    let LineValue::Text(text) = value else { return false };
+    ["NA", "N/A", "#N/A", "None", "null", "NULL", "inf", "-inf", "Inf", "-Inf"].contains(&text.as_str())
+}
+
+/// Returns true if the integer is the same as a float.
+#[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "that is the question")]
+fn is_exact(number: i64) -> bool {
+    (number as f64) as i128 == i128::from(number)
+}
+
 pub(super) fn lowest(column: &Column) -> i64 {
     match column.stored.range() {
         _ if column.name == "t" => 1,
@@ -213,12 +305,11 @@ pub(super) fn lowest(column: &Column) -> i64 {
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "a column of floating-point numbers rounds")]
+#[expect(clippy::cast_precision_loss, reason = "it is exact")]
 #[expect(clippy::cast_possible_truncation, reason = "that is the question")]
 fn is_held(column: &Column, value: &LineValue) -> bool {
     let number = match value {
-        LineValue::Int(value) => *value as f64,
-        LineValue::LargeInt(value) => *value as f64,
+        LineValue::Int(value) if is_exact(*value) => *value as f64,
         LineValue::Float(value) => *value,
         _ => return false,
     };

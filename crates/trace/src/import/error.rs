@@ -6,9 +6,12 @@ use std::io;
 use std::sync::Arc;
 
 use crate::error::TraceError;
+use crate::schema::domain::is_general;
 use exact::escape::visible;
 
 const TOLD: usize = 10;
+/// The number of faults in the message; the first one is usually the cause.
+const SHOWN: usize = 4;
 
 /// Columns of the mirror's steps. If all are missing, the steps belong to another domain.
 const OF_MIRRORS: [&str; 3] = ["body_color", "action", "self_color"];
@@ -71,13 +74,22 @@ impl From<Fault> for ImportError {
 
 fn listed(told: &[Fault], more: usize) -> String {
     let lacks = |column: &str| told.iter().any(|fault| fault.key.as_deref() == Some(column) && fault.found == "none");
-    let domain = OF_MIRRORS.into_iter().all(lacks).then_some(
-        "\nexpected columns of the domain `mirror`, found none of them\n  \
-         help: for steps of another domain give --definitions a file that says `domain = \"NAME\"`; see docs/how-to/domains.md",
-    );
-    let told = told.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    let is_other = OF_MIRRORS.into_iter().all(lacks);
+    let cause = is_other.then(|| {
+        let columns = OF_MIRRORS.map(|column| format!("`{column}`")).join(", ");
+        format!(
+            "this looks like another domain: expected columns of the domain `mirror`, found none of {columns}\n  \
+             help: give --definitions a file that says `domain = \"NAME\"`, or name the keys that have the columns with \
+             --map; see docs/how-to/domains.md\n"
+        )
+    });
+    let of_mirror = |fault: &&Fault| !is_other || fault.key.as_deref().is_none_or(is_general);
+    // A value that is there says more than one that is missing.
+    let (missing, wrong): (Vec<&Fault>, Vec<&Fault>) = told.iter().filter(of_mirror).partition(|it| it.found == "none");
+    let shown: Vec<String> = wrong.into_iter().chain(missing).take(SHOWN).map(ToString::to_string).collect();
+    let more = more + told.len() - shown.len();
     let more = if more == 0 { String::new() } else { format!("\nand {more} more; nothing was written") };
-    format!("{told}{more}{}", domain.unwrap_or_default())
+    format!("{}{}{more}", cause.unwrap_or_default(), shown.join("\n"))
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]

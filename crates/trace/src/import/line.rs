@@ -1,20 +1,21 @@
 //! Parses one line as a flat JSON object: keys and plain values, in the order of the line.
 //!
 //! Rule: strict JSON, unique keys, no nested values. Numbers keep their written type: `1` is an integer, `1.0` is not.
-//! But a column of integers takes `1.0` too: data frames write it beside missing values.
 
 use std::collections::HashSet;
 use std::fmt;
 
-use serde::de::{Deserialize, DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::error::Fault;
-use crate::schema::{self, Kind};
 use exact::escape::{exact, visible};
 
 pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
-#[derive(Clone, Debug, PartialEq)]
+/// A value of a line or row. Rows of tables are stored with it, so that no value passes through text.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LineValue {
     Null,
     Bool(bool),
@@ -23,6 +24,8 @@ pub enum LineValue {
     LargeInt(u64),
     Float(f64),
     Text(String),
+    /// A cell of CSV, whose type follows from its column.
+    Cell(String),
     List,
     Object(Members),
 }
@@ -39,10 +42,10 @@ impl LineValue {
             Self::Int(value) => value.to_string(),
             Self::LargeInt(value) => value.to_string(),
             Self::Float(value) => format!("{value:?}"),
-            Self::Text(text) if text.chars().count() > LONGEST => {
+            Self::Text(text) | Self::Cell(text) if text.chars().count() > LONGEST => {
                 format!("the text `{}...`", visible(&text.chars().take(LONGEST).collect::<String>()))
             }
-            Self::Text(text) => format!("the text `{}`", exact(text)),
+            Self::Text(text) | Self::Cell(text) => format!("the text `{}`", exact(text)),
             Self::List => "a list".into(),
             Self::Object(_) => "an object".into(),
         }
@@ -55,8 +58,9 @@ pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> 
         let found = format!("other bytes after the first {}", error.valid_up_to());
         Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
     })?;
-    match serde_json::from_str(text.trim_end()) {
-        Ok(LineValue::Object(members)) => Ok(with_integers(unique(members)?)),
+    let mut json = serde_json::Deserializer::from_str(text.trim_end());
+    match (Plain { is_line: true }).deserialize(&mut json).and_then(|value| json.end().map(|()| value)) {
+        Ok(LineValue::Object(members)) => Ok(unique(members)?),
         Ok(other) => Err(Box::new(Fault::new("a JSON object, one step", other.shown(), "write one object a line"))),
         Err(error) => Err(Box::new(no_json(text.trim_end(), ended, &error))),
     }
@@ -69,14 +73,33 @@ pub(super) fn whole(number: f64) -> Option<i64> {
     (number.fract() == 0.0 && number.abs() <= EXACT).then_some(number as i64)
 }
 
-fn with_integers(mut members: Members) -> Members {
-    let is_integer = |key: &str| schema::column(key).is_some_and(|column| column.stored.kind() == Kind::Int);
-    for (_, value) in members.iter_mut().filter(|(key, _)| is_integer(key)) {
-        if let LineValue::Float(number) = *value {
-            *value = whole(number).map_or(LineValue::Float(number), LineValue::Int);
-        }
+/// The values of a stored row.
+pub(super) fn of_record(bytes: &[u8]) -> Result<Members, Box<Fault>> {
+    if bytes.is_empty() {
+        return Ok(Members::new());
     }
-    members
+    let damaged = |error: rmp_serde::decode::Error| Fault::new("a stored row", error.to_string(), "import it again");
+    rmp_serde::from_slice(bytes).map_err(|error| Box::new(damaged(error)))
+}
+
+/// A row as its source stores it between the passes.
+pub(super) fn to_record(row: &Members) -> Vec<u8> {
+    rmp_serde::to_vec(row).expect("texts and numbers have a form in memory")
+}
+
+pub(super) fn of_json(value: &Value) -> LineValue {
+    match value {
+        Value::Null => LineValue::Null,
+        Value::Bool(value) => LineValue::Bool(*value),
+        Value::Number(number) => match (number.as_i64(), number.as_u64()) {
+            (Some(value), _) => LineValue::Int(value),
+            (None, Some(value)) => LineValue::LargeInt(value),
+            (None, None) => LineValue::Float(number.as_f64().unwrap_or(f64::NAN)),
+        },
+        Value::String(text) => LineValue::Text(text.clone()),
+        Value::Array(_) => LineValue::List,
+        Value::Object(_) => LineValue::Object(Members::new()),
+    }
 }
 
 fn unique(members: Members) -> Result<Members, Box<Fault>> {
@@ -112,12 +135,6 @@ fn is_no_number(text: &str, byte: usize) -> bool {
 /// The position of this byte in characters, both from 1.
 fn character(text: &str, byte: usize) -> usize {
     text.get(..text.floor_char_boundary(byte)).map_or(byte, |before| before.chars().count())
-}
-
-impl<'de> Deserialize<'de> for LineValue {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        Plain { is_line: true }.deserialize(deserializer)
-    }
 }
 
 /// The line itself, or a value inside it; the contents of lists and objects there are read and dropped.

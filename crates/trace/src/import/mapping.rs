@@ -2,9 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use arrow::array::{Array as _, ArrayRef, RecordBatch, new_null_array};
+use arrow::datatypes::DataType;
+use arrow::error::ArrowError;
+use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 
-use super::line;
+use super::cell;
+use super::line::{self, LineValue};
+use super::table::RowValues;
 use crate::schema::domain::is_general;
 use crate::schema::{Kind, column};
 use exact::escape::visible;
@@ -18,6 +24,19 @@ pub struct Mapping {
 }
 
 pub(super) type Row<'a> = [(&'a str, &'a Value)];
+
+/// A column of a table under its new name.
+pub(super) struct MappedColumn<'m> {
+    pub(super) name: &'m str,
+    pub(super) values: RowValues,
+    path: Option<&'m Path>,
+}
+
+/// A value, or a column of them, with parts.
+pub(super) trait Node: Sized {
+    fn member(&self, key: &str) -> Option<Self>;
+    fn item(&self, position: usize) -> Option<Self>;
+}
 
 /// The path to a value in a line: keys and positions separated by dots, and an integer to add to the value.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,19 +104,71 @@ impl Mapping {
         self.columns.iter().any(|(_, path)| path.is_at(keys) || path.is_within(keys))
     }
 
-    pub(super) fn flat(&mut self, row: &Row<'_>) -> Map<String, Value> {
-        let mut flat: Map<String, Value> =
+    pub(super) fn flat(&mut self, row: &Row<'_>) -> IndexMap<String, LineValue> {
+        let mut flat: IndexMap<String, LineValue> =
             self.columns.iter().map(|(name, path)| (name.clone(), path.value(name, row))).collect();
         for (key, value) in row {
             match value {
-                _ if flat.contains_key(*key) || self.columns.iter().any(|(_, path)| path.is_at(key)) => {}
-                Value::Array(_) | Value::Object(_) if self.columns.iter().any(|(_, path)| path.is_within(key)) => {}
-                Value::Array(_) | Value::Object(_) => *self.left_out.entry((*key).to_owned()).or_default() += 1,
-                value => drop(flat.insert((*key).to_owned(), (*value).clone())),
+                value if self.takes(key, value.is_array() || value.is_object()) => {}
+                Value::Array(_) | Value::Object(_) => self.leave_out(key, 1),
+                value => drop(flat.insert((*key).to_owned(), line::of_json(value))),
             }
         }
-        flat.extend(self.constants.iter().cloned());
+        flat.extend(self.constants());
         flat
+    }
+
+    /// The same for a row of cells.
+    pub(super) fn flat_cells(&self, row: &[(&str, LineValue)]) -> IndexMap<String, LineValue> {
+        let cell = |path: &Path| row.iter().find(|(key, _)| path.is_at(key)).map(|(_, cell)| cell.clone());
+        let mapped = self.columns.iter().map(|(name, path)| {
+            let found = cell(path).unwrap_or(LineValue::Null);
+            (name.clone(), path.finished(name, found))
+        });
+        let others =
+            row.iter().filter(|(key, _)| !self.takes(key, false)).map(|(key, cell)| ((*key).to_owned(), cell.clone()));
+        mapped.chain(others).chain(self.constants()).collect()
+    }
+
+    /// The same for the columns of a table. Errors: a column of a type that has no text.
+    pub(super) fn columns<'m>(&'m self, table: &'m RecordBatch) -> Result<Vec<MappedColumn<'m>>, ArrowError> {
+        let mapped = self.columns.iter().map(|(name, path)| (name.as_str(), Some(path), path.column(table)));
+        let schema = table.schema_ref().fields().iter().map(|field| field.name().as_str());
+        let others = schema.zip(table.columns());
+        let others = others.filter(|(name, values)| !values.data_type().is_nested() && !self.takes(name, false));
+        let others = others.map(|(name, values)| (name, None, Some(ArrayRef::clone(values))));
+        let is_free = |name: &str| !self.constants.iter().any(|(constant, _)| constant == name);
+        let columns = mapped.chain(others).filter(|(name, ..)| is_free(name));
+        let column = |(name, path, values): (&'m str, _, Option<ArrayRef>)| {
+            let values = values.unwrap_or_else(|| new_null_array(&DataType::Null, table.num_rows()));
+            RowValues::new(&values).map(|values| MappedColumn { name, values, path })
+        };
+        columns.map(column).collect()
+    }
+
+    pub(super) fn constants(&self) -> impl Iterator<Item = (String, LineValue)> + '_ {
+        self.constants.iter().map(|(name, value)| (name.clone(), line::of_json(value)))
+    }
+
+    pub(super) fn leave_out(&mut self, key: &str, rows: u64) {
+        *self.left_out.entry(key.to_owned()).or_default() += rows;
+    }
+
+    /// Returns true if a path takes the value of this key, or another value takes its name.
+    fn takes(&self, key: &str, is_nested: bool) -> bool {
+        let takes = |path: &Path| path.is_at(key) || is_nested && path.is_within(key);
+        self.columns.iter().any(|(name, path)| name == key || takes(path))
+    }
+}
+
+impl MappedColumn<'_> {
+    /// The value of a row. Errors: text that is not UTF-8.
+    pub(super) fn at(&self, row: usize) -> Result<LineValue, usize> {
+        let value = self.values.at(row)?;
+        Ok(match self.path {
+            Some(path) => path.finished(self.name, value),
+            None => value,
+        })
     }
 }
 
@@ -110,16 +181,41 @@ impl Path {
         self.keys.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'))
     }
 
-    /// The value in a row; null if absent. A number becomes text in columns that are text in every domain.
-    fn value(&self, name: &str, row: &Row<'_>) -> Value {
+    fn value(&self, name: &str, row: &Row<'_>) -> LineValue {
         let member = |key: &str| row.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
-        let found = within(member, &self.keys).cloned().unwrap_or_default();
-        let number = found.as_i64().or_else(|| found.as_f64().and_then(line::whole)).filter(|_| self.added != 0);
-        let found = match number.and_then(|number| number.checked_add(self.added)) {
-            Some(number) => Value::from(number),
-            None => found,
+        self.finished(name, within(member, &self.keys).map_or(LineValue::Null, line::of_json))
+    }
+
+    fn column(&self, table: &RecordBatch) -> Option<ArrayRef> {
+        within(|key| table.column_by_name(key).map(ArrayRef::clone), &self.keys)
+    }
+
+    /// The value with the number added. A number becomes text in columns that are text in every domain.
+    fn finished(&self, name: &str, found: LineValue) -> LineValue {
+        match self.added(found) {
+            number @ (LineValue::Int(_) | LineValue::LargeInt(_) | LineValue::Float(_)) if is_general_text(name) => {
+                LineValue::Text(number.shown())
+            }
+            value => value,
+        }
+    }
+
+    fn added(&self, found: LineValue) -> LineValue {
+        if self.added == 0 {
+            return found;
+        }
+        let number = match &found {
+            LineValue::Int(number) => Some(*number),
+            LineValue::Float(number) => line::whole(*number),
+            LineValue::Cell(text) => match cell::typed(text, Kind::Int) {
+                LineValue::Int(number) => Some(number),
+                _ => None,
+            },
+            _ => None,
         };
-        if found.is_number() && is_general_text(name) { Value::String(found.to_string()) } else { found }
+        let too_large = |number: i64| LineValue::Text(format!("{number}{:+}", self.added));
+        let sum = |number: i64| number.checked_add(self.added).map_or_else(|| too_large(number), LineValue::Int);
+        number.map_or(found, sum)
     }
 }
 
@@ -127,20 +223,28 @@ pub(super) fn is_general_text(name: &str) -> bool {
     is_general(name) && column(name).is_some_and(|column| column.stored.kind() == Kind::String)
 }
 
-fn at<'v>(value: &'v Value, path: &str) -> Option<&'v Value> {
-    match value {
-        value if path.is_empty() => Some(value),
-        Value::Object(members) => within(|key| members.get(key), path),
-        Value::Array(list) => {
-            let (position, rest) = path.split_once('.').unwrap_or((path, ""));
-            at(list.get(position.parse::<usize>().ok()?)?, rest)
-        }
-        _ => None,
+impl Node for &Value {
+    fn member(&self, key: &str) -> Option<Self> {
+        self.as_object()?.get(key)
+    }
+
+    fn item(&self, position: usize) -> Option<Self> {
+        self.as_array()?.get(position)
     }
 }
 
+fn at<N: Node>(node: N, path: &str) -> Option<N> {
+    if path.is_empty() {
+        return Some(node);
+    }
+    within(|key| node.member(key), path).or_else(|| {
+        let (position, rest) = path.split_once('.').unwrap_or((path, ""));
+        at(node.item(position.parse().ok()?)?, rest)
+    })
+}
+
 /// The value at a path that starts with the keys of `member`. Keys may contain dots.
-fn within<'v>(member: impl Fn(&str) -> Option<&'v Value>, path: &str) -> Option<&'v Value> {
+fn within<N: Node>(member: impl Fn(&str) -> Option<N>, path: &str) -> Option<N> {
     let nested = || path.match_indices('.').find_map(|(dot, _)| at(member(&path[..dot])?, &path[dot + 1..]));
     member(path).or_else(nested)
 }

@@ -1,7 +1,7 @@
-//! Makes a trace from JSON lines of steps, for harnesses that mirrorstats did not run.
+//! Makes a trace from steps and logs of harnesses that mirrorstats did not run.
 //!
 //! ```text
-//! lines ──► first pass: every line checked, where each step lies ──► second pass: rows, episode by episode ──► trace
+//! lines, or rows of a format with their types ──► first pass: every line checked, where each step lies ──► second pass: rows, episode by episode ──► trace
 //! ```
 //!
 //! One line is one step, a flat object with the columns of the schema as keys (`schemas/step.schema.json`). Other keys
@@ -11,6 +11,7 @@
 //! Rule: all or nothing. A line that cannot be taken unchanged fails the import; values are never filled in or dropped.
 //! Memory holds the position of each step, not the steps.
 
+mod cell;
 mod columns;
 mod error;
 mod format;
@@ -18,6 +19,7 @@ mod index;
 mod line;
 mod mapping;
 pub mod schema;
+mod table;
 mod text;
 
 use std::collections::HashMap;
@@ -56,6 +58,8 @@ pub struct Limits<'a> {
     /// The known colours, which the trace then declares; any if `None`.
     pub palette: Option<&'a Palette>,
     pub cluster: Option<Cluster>,
+    /// The name and text of the definitions, if they are not built in; the trace then carries them.
+    pub definitions: Option<(&'a str, &'a str)>,
     /// True if the steps were rebuilt from published numbers, so that other values in them are arbitrary.
     pub is_reconstruction: bool,
 }
@@ -70,6 +74,9 @@ impl Limits<'_> {
         }
         if let Some(palette) = self.palette {
             recording["palette"] = json!(palette.names());
+        }
+        if let Some((name, text)) = self.definitions {
+            recording["definitions"] = json!({ "name": name, "text": text });
         }
         if let Some(cluster) = self.cluster {
             recording["design"] = json!({ "cluster": cluster });
@@ -128,13 +135,15 @@ fn survey(
     text.rewind()?;
     while let Some(line) = text.next_line()? {
         is_empty = false;
-        let members = match line::members(&line.bytes, line.ended) {
+        let members = match text.members(&line.bytes, line.ended) {
             Ok(members) => members,
             Err(fault) => {
                 faults.add(fault.at(&line.place));
                 continue;
             }
         };
+        let (members, other) = columns.typed(members, &text.folders, limits);
+        faults.extend(other.map(|fault| fault.at(&line.place)));
         let found = columns.check(&members, &line.place, limits);
         if found.is_empty() {
             faults.extend(index.add(at, &line, &members));
@@ -165,9 +174,10 @@ fn write(
     let failed = |error: ParquetError| TraceError::write(out, error);
     let known = columns.known().map(|column| (field(column), Some(column.stored.kind())));
     let own = columns.own().into_iter().map(|own| {
-        // A column of nulls is compatible with any type in other files.
-        let stored = own.kind.map_or(DataType::Null, Kind::data_type);
-        (Field::new(&own.name, stored, true), own.kind)
+        // A column of nulls is compatible with any type in other files, unless the definitions declare its own.
+        let declared = || limits.expected.declared.iter().find(|declared| declared.name == own.name);
+        let kind = own.kind.or_else(|| Some(declared()?.kind));
+        (Field::new(&own.name, kind.map_or(DataType::Null, Kind::data_type), true), kind)
     });
     let mut rows = Gathered::new(known.chain(own));
     let mut file = RowGroups::new(file, &rows.layout, Some(&recording), true).map_err(failed)?;
@@ -175,7 +185,8 @@ fn write(
         for step in episode {
             let text = &mut texts[step.text];
             let bytes = text.line_at(step.offset)?;
-            let members = line::members(&bytes, true).map_err(|_| ImportError::changed(&text.name))?;
+            let members = text.members(&bytes, true).map_err(|_| ImportError::changed(&text.name))?;
+            let members = columns.with_cells(columns.typed(members, &text.folders, limits).0);
             add(&mut rows, &members).map_err(|()| ImportError::changed(&text.name))?;
         }
         file.end_episode(&mut rows).map_err(failed)?;

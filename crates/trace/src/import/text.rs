@@ -1,21 +1,21 @@
-//! A text of lines that is read twice: from start to end, then line by line at known positions.
+//! A text of lines, or rows stored by their types, that is read twice: from start to end, then at known positions.
 //!
 //! Input that cannot be read twice (standard input, a pipe) goes through a temporary file. A byte order mark and blank
 //! lines are skipped, but blank lines are counted. A line may end with `\n` or `\r\n`.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek as _, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::error::{ImportError, Place};
+use super::error::{Fault, ImportError, Place};
 use super::format::lerobot::data_set;
-use super::format::{Format, RowSink};
-use super::line::BYTE_ORDER_MARK;
+use super::format::{Format, HEAD, RowSink};
+use super::line::{self, BYTE_ORDER_MARK, LineValue, Members};
 use super::mapping::Mapping;
-use crate::inputs::Input;
+use crate::inputs::{Input, folder_values};
 use exact::budget::Limit;
 use exact::{hash, input};
 
@@ -27,6 +27,10 @@ pub struct Text {
     /// The position of the reader, in bytes from the start.
     offset: u64,
     lines: u64,
+    /// Columns in the names of its folders.
+    pub(super) folders: Members,
+    /// The hash of the file as it was compressed.
+    sha256: Option<String>,
     pub(super) source: Option<Source>,
 }
 
@@ -50,6 +54,14 @@ pub(super) struct Line {
 /// A step with its whole reply; the longest reply of a model has some hundred thousand bytes.
 pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
 
+/// The number of bytes of a stored row's length.
+const LENGTH: usize = size_of::<u32>();
+
+/// The most bytes that a compressed file may inflate to.
+const fn most_inflated(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes inflated from a file of its size", 64 << 20, 96, bytes)
+}
+
 /// The limit for piped input, which is stored on disk meanwhile.
 const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
 
@@ -65,7 +77,41 @@ impl Text {
         }
         let file = input::open_text(path).map_err(failed())?;
         let about = file.metadata().map_err(failed())?;
-        if about.is_file() { Ok(Self::of_file(&name, file)) } else { Self::spool(&name, file) }
+        let text = if about.is_file() { Self::of_file(&name, file).inflated()? } else { Self::spool(&name, file)? };
+        let cell = |value: Option<String>| value.map_or(LineValue::Null, LineValue::Cell);
+        let folders = folder_values(path).into_iter().map(|(name, value)| (name, cell(value))).collect();
+        Ok(Self { folders, ..text })
+    }
+
+    /// The text in a file that gzip or zstd compressed.
+    fn inflated(mut self) -> Result<Self, ImportError> {
+        let failed = || ImportError::read(&self.name);
+        let bytes = self.reader.get_ref().metadata().map_err(failed())?.len();
+        let mut start = [0; 4];
+        let read = self.reader.read(&mut start).map_err(failed())?;
+        self.reader.rewind().map_err(failed())?;
+        let stored = &mut self.reader;
+        let inflate: Box<dyn Read + '_> = match &start[..read] {
+            [0x1f, 0x8b, ..] => Box::new(flate2::read::MultiGzDecoder::new(stored)),
+            [0x28, 0xb5, 0x2f, 0xfd] => Box::new(zstd::stream::read::Decoder::with_buffer(stored).map_err(failed())?),
+            _ => return Ok(self),
+        };
+        let limit = most_inflated(bytes);
+        let mut file = tempfile::tempfile().map_err(failed())?;
+        let copied = io::copy(&mut inflate.take(limit.most().saturating_add(1)), &mut file);
+        copied.and_then(|bytes| limit.check(bytes).map_err(Into::into)).map_err(failed())?;
+        file.rewind().map_err(failed())?;
+        let sha256 = Some(self.hash()?);
+        Ok(Self { sha256, ..Self::of_file(&self.name, file) })
+    }
+
+    /// The format by the first bytes and the name.
+    pub fn format(&mut self) -> Result<Format, ImportError> {
+        self.rewind()?;
+        let mut head = Vec::new();
+        self.reader.by_ref().take(HEAD).read_to_end(&mut head).map_err(ImportError::read(&self.name))?;
+        self.rewind()?;
+        Ok(Format::of(&self.name, &head))
     }
 
     /// The rows of a folder as lines of flat steps, in a temporary file; `None` if it is not a data set of `LeRobot`.
@@ -75,10 +121,10 @@ impl Text {
         }
         let (name, format) = (Input::new(folder).name, Format::LeRobot);
         let source = Source { sha256: data_set::hash_of(folder)?, format, mapping: mapping.declared() };
-        let mut rows = RowSink::new(&name, &source.sha256, mapping)?;
+        let mut rows = RowSink::new(&name, data_set::bytes_of(folder)?, &source.sha256, mapping)?;
         data_set::read_folder(folder, &mut rows)?;
-        let lines = Self::of_file(&name, rows.finish()?);
-        Ok(Some(Self { noun: format.noun(), source: Some(source), ..lines }))
+        let rows = Self::of_file(&name, rows.finish()?);
+        Ok(Some(Self { noun: "row", source: Some(source), ..rows }))
     }
 
     /// The rest of a stream, stored in a temporary file.
@@ -87,27 +133,49 @@ impl Text {
         let copied = io::copy(&mut stream.take(LARGEST_STREAM.most().saturating_add(1)), &mut file);
         let checked = copied.and_then(|bytes| LARGEST_STREAM.check(bytes).map_err(Into::into));
         checked.map_err(ImportError::read(name))?;
-        Ok(Self::of_file(name, file))
+        Self::of_file(name, file).inflated()
     }
 
-    /// The rows of a file of this format as lines of flat steps, in a temporary file.
+    /// The rows of a file of this format, stored by their types in a temporary file.
     pub fn mapped(mut self, format: Format, mapping: &mut Mapping) -> Result<Self, ImportError> {
-        if format == Format::JsonLines && mapping.is_empty() {
+        let is_list = self.format()? == Format::JsonLines && self.begins_a_list()?;
+        let are_lines = format == Format::JsonLines && !is_list;
+        if are_lines && mapping.is_empty() {
             return Ok(self);
         }
+        let bytes = self.reader.get_ref().metadata().map_err(ImportError::read(&self.name))?.len();
         let source = Source { sha256: self.hash()?, format, mapping: mapping.declared() };
-        let mut rows = RowSink::new(&self.name, &source.sha256, mapping)?;
-        match format {
-            Format::JsonLines => while rows.add_line(&self.read_line()?)? {},
-            _ => format.read(self.reader.into_inner(), &mut rows)?,
+        let mut rows = RowSink::new(&self.name, bytes, &source.sha256, mapping)?;
+        if are_lines {
+            while let Some(line) = self.next_line()? {
+                rows.add_line(&line)?;
+            }
+        } else {
+            format.read(self.reader.into_inner(), &mut rows)?;
         }
-        let lines = Self::of_file(&self.name, rows.finish()?);
-        Ok(Self { noun: format.noun(), source: Some(source), ..lines })
+        let rows = Self::of_file(&self.name, rows.finish()?);
+        let noun = if are_lines { "line" } else { "row" };
+        Ok(Self { noun, folders: self.folders, source: Some(source), ..rows })
+    }
+
+    fn begins_a_list(&mut self) -> Result<bool, ImportError> {
+        let head = self.reader.fill_buf().map_err(ImportError::read(&self.name))?;
+        let head = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
+        Ok(head.trim_ascii_start().starts_with(b"["))
     }
 
     fn of_file(name: &str, file: File) -> Self {
         let reader = BufReader::new(file);
-        Self { name: name.into(), noun: "line", reader, offset: 0, lines: 0, source: None }
+        Self {
+            name: name.into(),
+            noun: "line",
+            reader,
+            offset: 0,
+            lines: 0,
+            folders: Vec::new(),
+            sha256: None,
+            source: None,
+        }
     }
 
     pub(super) fn place(&self, line: u64) -> Place {
@@ -121,8 +189,8 @@ impl Text {
     }
 
     pub(super) fn hash(&mut self) -> Result<String, ImportError> {
-        if let Some(source) = &self.source {
-            return Ok(source.sha256.clone());
+        if let Some(known) = self.source.as_ref().map(|source| &source.sha256).or(self.sha256.as_ref()) {
+            return Ok(known.clone());
         }
         self.rewind()?;
         let hash = hash::of_reader(&mut self.reader).map_err(ImportError::read(&self.name))?;
@@ -140,8 +208,8 @@ impl Text {
             }
             self.lines += 1;
             let ended = bytes.ends_with(b"\n");
-            skip_mark(offset, &mut bytes);
-            if !bytes.trim_ascii().is_empty() {
+            self.strip(offset, &mut bytes);
+            if !bytes.trim_ascii().is_empty() || self.source.is_some() && !bytes.is_empty() {
                 let place = self.place(self.lines);
                 return Ok(Some(Line { place, offset, bytes, ended }));
             }
@@ -159,19 +227,43 @@ impl Text {
             self.offset = offset;
         }
         let mut bytes = self.read_line()?;
-        skip_mark(offset, &mut bytes);
+        self.strip(offset, &mut bytes);
         Ok(bytes)
     }
 
+    /// The values of a line or stored row.
+    pub(super) fn members(&self, bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
+        if self.source.is_some() { line::of_record(bytes) } else { line::members(bytes, ended) }
+    }
+
+    /// Removes what stands before the contents: the length of a stored row, or a byte order mark.
+    fn strip(&self, offset: u64, bytes: &mut Vec<u8>) {
+        if self.source.is_some() {
+            bytes.drain(..LENGTH);
+        } else if offset == 0 && bytes.starts_with(BYTE_ORDER_MARK) {
+            bytes.drain(..BYTE_ORDER_MARK.len());
+        }
+    }
+
+    /// The bytes of a line, or of a stored row behind its length; empty at the end.
     fn read_line(&mut self) -> Result<Vec<u8>, ImportError> {
-        let bytes = input::line(&mut self.reader, LONGEST_LINE).map_err(ImportError::read(&self.name))?;
+        let bytes = match self.source {
+            Some(_) => record(&mut self.reader),
+            None => input::line(&mut self.reader, LONGEST_LINE),
+        };
+        let bytes = bytes.map_err(ImportError::read(&self.name))?;
         self.offset += bytes.len() as u64;
         Ok(bytes)
     }
 }
 
-fn skip_mark(offset: u64, line: &mut Vec<u8>) {
-    if offset == 0 && line.starts_with(BYTE_ORDER_MARK) {
-        line.drain(..BYTE_ORDER_MARK.len());
+fn record(rows: &mut impl BufRead) -> io::Result<Vec<u8>> {
+    if rows.fill_buf()?.is_empty() {
+        return Ok(Vec::new());
     }
+    let mut length = [0; LENGTH];
+    rows.read_exact(&mut length)?;
+    let mut bytes = vec![0; LENGTH + u32::from_le_bytes(length) as usize];
+    rows.read_exact(&mut bytes[LENGTH..])?;
+    Ok(bytes)
 }

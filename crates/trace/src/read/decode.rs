@@ -175,6 +175,12 @@ impl<'a> RowGroup<'a> {
         let columns =
             (0..self.sources.len()).map(|at| self.column(at, count).and_then(|column| self.within(at, column)));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
+        for folder in self.file.folders() {
+            let column = self.layout.position(&folder.column.name).map(|at| &columns[at]);
+            if let Some(finding) = column.and_then(|column| folder.contradiction(self.file.name(), column)) {
+                return Err(Box::new(finding.in_row_group(self.index)));
+            }
+        }
         if count == 0 {
             return self.check_statistics().map(|()| None);
         }
@@ -236,7 +242,12 @@ impl<'a> RowGroup<'a> {
             return Ok(Column::Runs(ids.runs.slice(self.first, count)));
         }
         let ColumnSource::Library(library) = &mut self.sources[at] else {
-            return Ok(Column::Flat(new_null_array(&held_as(kind), count)));
+            let folder = self.file.folder(&self.layout.columns[at].name);
+            let values = folder.map_or_else(
+                || Ok(new_null_array(&held_as(kind), count)),
+                |folder| folder.repeated(&held_as(kind), count),
+            );
+            return values.map(Column::Flat).map_err(|error| corrupt(self.file, self.index, &error.to_string()));
         };
         loop {
             let held = library.rows();

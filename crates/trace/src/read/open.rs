@@ -28,6 +28,8 @@ pub struct ColumnUse {
     pub kind: Kind,
     /// The name of a file without the column, if any; its rows read as null.
     pub missing_from: Option<String>,
+    /// True if its type in every file that has it says that it holds only nulls; it then fits any declared type.
+    pub is_null: bool,
     /// Two files that disagree on the type, with their types.
     pub conflict: Option<[(String, Kind); 2]>,
 }
@@ -86,7 +88,7 @@ impl TraceSet {
     /// The use of a column over all files; `None` if no file and no label has it.
     pub fn column(&self, name: &str) -> Option<ColumnUse> {
         if self.is_label_column(name) {
-            return Some(ColumnUse { kind: Kind::Bool, missing_from: None, conflict: None });
+            return Some(ColumnUse { kind: Kind::Bool, missing_from: None, is_null: false, conflict: None });
         }
         let mut seen: Option<(&TraceFile, Kind)> = None;
         let (mut present, mut missing_from, mut conflict) = (false, None, None);
@@ -104,7 +106,8 @@ impl TraceSet {
         // A column that is null in every file has the schema's type, or text if it is not in the schema.
         let unseen = || self.domain().column(name).map_or(Kind::String, |column| column.stored.kind());
         let kind = if conflict.is_some() { Kind::Unsupported } else { seen.map_or_else(unseen, |(_, kind)| kind) };
-        (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
+        let is_null = seen.is_none();
+        (present || !is_null).then_some(ColumnUse { kind, missing_from, is_null, conflict })
     }
 
     pub fn declares(&self, name: &str) -> bool {
@@ -116,7 +119,8 @@ impl TraceSet {
         let known = COLUMNS.iter().filter(|column| self.domain().has(column)).map(|column| column.name);
         let mut names: Vec<&str> =
             known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
-        for column in self.files.iter().flat_map(TraceFile::columns) {
+        let all = |file| TraceFile::columns(file).iter().chain(file.folders().iter().map(|folder| &folder.column));
+        for column in self.files.iter().flat_map(all) {
             if !names.contains(&column.name.as_str()) {
                 names.push(&column.name);
             }

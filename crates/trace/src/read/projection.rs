@@ -25,6 +25,8 @@ pub(crate) struct LayoutColumn {
     /// True if it must be constant in an episode.
     pub(crate) constant: bool,
     pub(crate) values: Vec<String>,
+    /// True if it holds only nulls in all files, of no type.
+    is_null: bool,
 }
 
 impl Layout {
@@ -52,7 +54,8 @@ impl Layout {
         let known = set.schema_column(name);
         let kind = kind_in(set, name)?;
         let constant = constant || known.is_some_and(|column| column.constant);
-        self.columns.push(LayoutColumn { name: name.to_owned(), kind, known, constant, values: Vec::new() });
+        let is_null = set.column(name).is_some_and(|column| column.is_null);
+        self.columns.push(LayoutColumn { name: name.to_owned(), kind, known, constant, values: Vec::new(), is_null });
         Ok(())
     }
 
@@ -60,7 +63,8 @@ impl Layout {
     pub(crate) fn with_declared(&mut self, declared: &[DeclaredColumn]) {
         for declared in declared {
             let own = self.columns.iter_mut().find(|column| column.name == declared.name && column.known.is_none());
-            if let Some(column) = own.filter(|column| column.kind == declared.kind) {
+            if let Some(column) = own.filter(|column| column.kind == declared.kind || column.is_null) {
+                column.kind = declared.kind;
                 column.values.clone_from(&declared.values);
                 column.constant |= declared.constant;
             }

@@ -15,6 +15,7 @@ use arrow::datatypes::{DataType, Field, Fields, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
+use super::footer::folder_columns::FolderColumn;
 use super::footer::plain;
 use super::footer::trace_file::{Readable, TraceFile};
 use super::open::TraceSet;
@@ -57,6 +58,7 @@ struct Part {
     path: PathBuf,
     readable: Arc<Readable>,
     expansion: Arc<Expansion>,
+    folders: Vec<FolderColumn>,
     row_group: usize,
 }
 
@@ -117,12 +119,15 @@ impl Steps {
 }
 
 impl StepSelection {
-    fn complete(&self, rows: &RecordBatch) -> Result<RecordBatch, TraceError> {
+    fn complete(&self, rows: &RecordBatch, folders: &[FolderColumn]) -> Result<RecordBatch, TraceError> {
         let column = |field: &Arc<Field>| -> Result<ArrayRef, arrow::error::ArrowError> {
             let options = CastOptions { safe: false, ..CastOptions::default() };
             match rows.column_by_name(field.name()) {
                 Some(values) => cast_with_options(values, field.data_type(), &options),
-                None => Ok(new_null_array(field.data_type(), rows.num_rows())),
+                None => match folders.iter().find(|folder| folder.column.name == *field.name()) {
+                    Some(folder) => folder.repeated(field.data_type(), rows.num_rows()),
+                    None => Ok(new_null_array(field.data_type(), rows.num_rows())),
+                },
             }
         };
         let columns = self.schema.fields().iter().map(column).collect::<Result<Vec<_>, _>>();
@@ -178,6 +183,7 @@ impl Part {
             path: file.path().to_owned(),
             readable: Arc::clone(&readable),
             expansion: Arc::clone(&file.expansion),
+            folders: file.folders().to_vec(),
             row_group,
         };
         Ok((0..readable.footer.metadata().num_row_groups()).map(part).collect())
@@ -195,21 +201,21 @@ impl Part {
     }
 
     fn send(self, shape: &StepSelection, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
-        let name = self.name.clone();
+        let (name, folders) = (self.name.clone(), self.folders.clone());
         let (mut reader, slot) = self.reader(&shape.schema)?;
         loop {
             let next = contained(|| reader.next())
                 .and_then(|next| next.transpose().map_err(|error| error.to_string()))
                 .map_err(|error| damaged(&name, &slot, &error))?;
             let Some(rows) = next else { return Ok(()) };
-            if sender.send(Ok(Some(shape.complete(&rows)?))).is_err() {
+            if sender.send(Ok(Some(shape.complete(&rows, &folders)?))).is_err() {
                 return Ok(());
             }
         }
     }
 
     fn reader(self, schema: &Schema) -> Result<(ParquetRecordBatchReader, FaultSlot), Box<Finding>> {
-        let Self { name, path, readable, expansion, row_group } = self;
+        let Self { name, path, readable, expansion, row_group, .. } = self;
         let file = input::open(&path).map_err(|error| Finding::unreadable(&name, &error))?;
         let store = Store::new(file, expansion);
         let metadata = Arc::clone(readable.footer.metadata());

@@ -91,8 +91,11 @@ fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text
         return Ok(text);
     }
     let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
-    let format = from.unwrap_or_else(|| Format::of_file(path));
-    text.and_then(|text| text.mapped(format, mapping)).map_err(Failure::input)
+    let mapped = text.and_then(|mut text| {
+        let format = from.map_or_else(|| text.format(), Ok)?;
+        text.mapped(format, mapping)
+    });
+    mapped.map_err(Failure::input)
 }
 
 fn formats() -> impl TypedValueParser<Value = Format> {

@@ -6,21 +6,24 @@ mod csv;
 mod inspect;
 mod inspect_robots;
 mod json;
+mod json_list;
 mod json_log;
 pub(super) mod lerobot;
 mod parquet;
 
 use std::fs::File;
-use std::io::{BufWriter, Read as _, Seek as _, Write as _};
-use std::path::Path;
+use std::io::{BufWriter, Seek as _, Write as _};
 
+use arrow::array::{Array as _, RecordBatch};
 use serde_json::{Map, Value};
 
 use super::error::{Fault, ImportError};
-use super::line::{self, BYTE_ORDER_MARK};
-use super::mapping::{Mapping, Row};
+use super::line::{self, BYTE_ORDER_MARK, LineValue};
+use super::mapping::{MappedColumn, Mapping, Row};
+use super::text::{LONGEST_LINE, Line};
+use crate::read::budget::most_stored;
 use exact::budget::{Budget, Exceeded, Limit};
-use exact::input;
+use exact::escape::visible;
 use json::WithoutNan;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,8 +47,6 @@ exact::names!(Format {
     LeRobot: "lerobot",
 });
 
-const UNLIMITED: Limit = Limit::new("bytes of rows", u64::MAX);
-
 /// The bytes of text whose reading and writing costs as much as a value itself.
 const VALUE: u64 = 64;
 
@@ -54,24 +55,30 @@ const fn most_rows(bytes: u64) -> Limit {
 }
 
 /// The number of bytes that identify the kind of a JSON file.
-const HEAD: u64 = 64 << 10;
+pub(super) const HEAD: u64 = 64 << 10;
+
+/// Endings of compressed files, whose contents have the format before it.
+const COMPRESSED: [&str; 3] = [".gz", ".zst", ".zstd"];
 
 impl Format {
-    /// The format by a file's name and first bytes; JSON Lines if they show no other.
-    pub fn of_file(path: &Path) -> Self {
-        match path.extension().and_then(|ending| ending.to_str()) {
-            Some("csv") => Self::Csv,
-            Some("parquet") => Self::Parquet,
+    /// The format by a file's first bytes, then by its name; JSON Lines if they show no other.
+    pub(super) fn of(name: &str, head: &[u8]) -> Self {
+        let name = name.to_ascii_lowercase();
+        let name = COMPRESSED.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(&name);
+        let text = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head).trim_ascii_start();
+        match name.rsplit_once('.').map(|(_, ending)| ending) {
+            _ if head.starts_with(b"PAR1") => Self::Parquet,
+            _ if head.starts_with(b"PK\x03\x04") => Self::Inspect,
+            _ if text.starts_with(b"{") => Self::of_json(&String::from_utf8_lossy(head)),
+            _ if text.starts_with(b"[") => Self::JsonLines,
+            Some("csv" | "tsv") => Self::Csv,
+            Some("parquet" | "parq" | "pq") => Self::Parquet,
             Some("eval") => Self::Inspect,
-            Some("json") => Self::of_json(path),
             _ => Self::JsonLines,
         }
     }
 
-    fn of_json(path: &Path) -> Self {
-        let mut head = Vec::new();
-        let _ = input::open(path).and_then(|file| file.take(HEAD).read_to_end(&mut head));
-        let head = String::from_utf8_lossy(&head);
+    fn of_json(head: &str) -> Self {
         let has = |key: &str| head.contains(key);
         match () {
             () if has("\"inspect_robots_version\"") => Self::InspectRobots,
@@ -81,17 +88,13 @@ impl Format {
         }
     }
 
-    pub(super) const fn noun(self) -> &'static str {
-        if matches!(self, Self::JsonLines) { "line" } else { "row" }
-    }
-
     pub(super) fn read(self, mut file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
         file.rewind().map_err(ImportError::read(&rows.file))?;
         if matches!(self, Self::Inspect | Self::InspectRobots) {
             rows.budget = Budget::new(most_rows(file.metadata().map_err(ImportError::read(&rows.file))?.len()));
         }
         match self {
-            Self::JsonLines => Ok(()),
+            Self::JsonLines => json_list::read(file, rows),
             Self::Csv => csv::read(&file, rows),
             Self::Parquet => parquet::read(file, rows),
             Self::Inspect if inspect::is_archive(&mut file).map_err(ImportError::read(&rows.file))? => {
@@ -104,7 +107,7 @@ impl Format {
     }
 }
 
-/// The destination of rows: a mapping, then a temporary file of lines.
+/// The destination of rows: a mapping, then a temporary file of typed values, each row behind its length.
 pub(super) struct RowSink<'m> {
     pub(super) file: String,
     /// The first digits of its hash, which keep ids distinct between files that number their episodes from 0.
@@ -113,23 +116,20 @@ pub(super) struct RowSink<'m> {
     /// Values of a sample or of the whole log are repeated in every row.
     pub(super) budget: Budget,
     out: BufWriter<File>,
+    rows: u64,
 }
 
 impl<'m> RowSink<'m> {
-    pub(super) fn new(file: &str, sha256: &str, mapping: &'m mut Mapping) -> Result<Self, ImportError> {
-        let out = tempfile::tempfile().map_err(ImportError::read(file))?;
+    pub(super) fn new(file: &str, bytes: u64, sha256: &str, mapping: &'m mut Mapping) -> Result<Self, ImportError> {
+        let out = BufWriter::new(tempfile::tempfile().map_err(ImportError::read(file))?);
         let digits = sha256.chars().take(8).collect();
-        Ok(Self { file: file.to_owned(), digits, mapping, budget: Budget::new(UNLIMITED), out: BufWriter::new(out) })
+        Ok(Self { file: file.to_owned(), digits, mapping, budget: Budget::new(most_stored(bytes)), out, rows: 0 })
     }
 
     pub(super) fn add(&mut self, row: &Row<'_>) -> Result<(), ImportError> {
         let flat = self.mapping.flat(row);
-        let mut line = serde_json::to_vec(&flat).unwrap_or_default();
-        line.push(b'\n');
-        self.budget
-            .spend(line.len() as u64 + VALUE * flat.len() as u64)
-            .map_err(|exceeded| self.over("", &exceeded))?;
-        self.write(&line)
+        self.budget.spend(VALUE * flat.len() as u64).map_err(|exceeded| self.over("", &exceeded))?;
+        self.store(flat)
     }
 
     pub(super) fn add_object(&mut self, object: &Map<String, Value>) -> Result<(), ImportError> {
@@ -137,14 +137,44 @@ impl<'m> RowSink<'m> {
         self.add(&row)
     }
 
-    pub(super) fn add_line(&mut self, line: &[u8]) -> Result<bool, ImportError> {
-        let bytes = line.strip_prefix(BYTE_ORDER_MARK).unwrap_or(line);
-        let object = line::members(bytes, true).ok().and_then(|_| serde_json::from_slice(bytes.trim_ascii()).ok());
-        match object {
-            Some(object) => self.add_object(&object)?,
-            None => self.write(bytes)?,
+    pub(super) fn add_cells(&mut self, row: &[(&str, LineValue)]) -> Result<(), ImportError> {
+        let flat = self.mapping.flat_cells(row);
+        self.store(flat)
+    }
+
+    pub(super) fn add_table(&mut self, table: &RecordBatch) -> Result<(), ImportError> {
+        for (field, values) in table.schema_ref().fields().iter().zip(table.columns()) {
+            if values.data_type().is_nested() && !self.mapping.reads(field.name()) {
+                self.mapping.leave_out(field.name(), (values.len() - values.null_count()) as u64);
+            }
         }
-        Ok(!line.is_empty())
+        let unreadable = |found: String| self.fault("", "columns of known types", found, "write the file anew");
+        let columns = self.mapping.columns(table).map_err(|error| unreadable(error.to_string()))?;
+        let constants: Vec<_> = self.mapping.constants().collect();
+        let mut rows = Vec::with_capacity(table.num_rows());
+        for row in 0..table.num_rows() {
+            let value = |column: &MappedColumn<'_>| match column.at(row) {
+                Ok(value) => Ok((column.name.to_owned(), value)),
+                Err(valid) => {
+                    let found = format!("other bytes in column `{}` after the first {valid}", visible(column.name));
+                    Err(self.fault("", "text in UTF-8", found, "write the file anew"))
+                }
+            };
+            let values = columns.iter().map(value).collect::<Result<Vec<_>, _>>()?;
+            rows.push(line::to_record(&values.into_iter().chain(constants.iter().cloned()).collect()));
+        }
+        rows.iter().try_for_each(|row| self.write(row))
+    }
+
+    /// A line of JSON. The blank lines before it count, so that rows have the numbers of their lines.
+    pub(super) fn add_line(&mut self, line: &Line) -> Result<(), ImportError> {
+        line::members(&line.bytes, line.ended).map_err(|fault| fault.at(&line.place))?;
+        while self.rows + 1 < line.place.line {
+            self.write(&[])?;
+        }
+        let object: Map<String, Value> = serde_json::from_slice(line.bytes.trim_ascii())
+            .map_err(|error| self.fault("", "strict JSON", error.to_string(), "correct the line"))?;
+        self.add_object(&object)
     }
 
     pub(super) fn fault(&self, part: &str, expected: &str, found: impl Into<String>, help: &str) -> ImportError {
@@ -161,7 +191,17 @@ impl<'m> RowSink<'m> {
         out.into_inner().map_err(|error| ImportError::read(&file)(error.into_error()))
     }
 
-    fn write(&mut self, bytes: &[u8]) -> Result<(), ImportError> {
-        self.out.write_all(bytes).map_err(ImportError::read(&self.file))
+    fn store(&mut self, row: impl IntoIterator<Item = (String, LineValue)>) -> Result<(), ImportError> {
+        let row: Vec<_> = row.into_iter().collect();
+        self.write(&line::to_record(&row))
+    }
+
+    fn write(&mut self, record: &[u8]) -> Result<(), ImportError> {
+        let length = u32::try_from(record.len()).unwrap_or(u32::MAX);
+        let counted = LONGEST_LINE.check(length.into()).and_then(|()| self.budget.spend(length.into()));
+        counted.map_err(|exceeded| self.over("", &exceeded))?;
+        self.rows += 1;
+        let written = self.out.write_all(&length.to_le_bytes()).and_then(|()| self.out.write_all(record));
+        written.map_err(ImportError::read(&self.file))
     }
 }

@@ -1,68 +1,69 @@
-//! Parquet of any shape: one row per step, with values as in JSON.
+//! Parquet of any shape: one row per step, with the values of its columns unchanged.
 
 use std::fs::File;
+use std::sync::Arc;
 
+use ::parquet::schema::types::Type;
 use arrow::array::RecordBatch;
-use arrow::json::WriterBuilder;
-use arrow::json::writer::LineDelimited;
-use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use serde_json::{Map, Value};
 
 use super::RowSink;
-use crate::catch_panic::contained;
-use crate::import::error::ImportError;
-
-const BATCH: usize = 1024;
+use crate::diagnostic::{Code, Finding};
+use crate::import::error::{Fault, ImportError};
+use crate::read::budget::most_imported;
+use crate::read::flat::TableRows;
+use crate::read::footer::{Extent, Footer, footer_of};
 
 pub(super) fn read(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
-    each_row(file, rows, |row, rows| rows.add_object(&row))
+    each_batch(file, rows, &|_| false, |batch, rows| rows.add_table(&batch))
 }
 
-pub(super) fn each_row(
+/// The rows of a file in batches: its flat columns, and the nested ones that the mapping or `also` reads. The other
+/// nested columns are counted as left out.
+pub(super) fn each_batch(
     file: File,
     rows: &mut RowSink<'_>,
-    add: impl FnMut(Map<String, Value>, &mut RowSink<'_>) -> Result<(), ImportError>,
+    also: &dyn Fn(&str) -> bool,
+    add: impl FnMut(RecordBatch, &mut RowSink<'_>) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
-    each_row_of(file, rows, &[], add)
-}
-
-/// The same for these columns only; all columns if the list is empty.
-pub(super) fn each_row_of(
-    file: File,
-    rows: &mut RowSink<'_>,
-    columns: &[&str],
-    mut add: impl FnMut(Map<String, Value>, &mut RowSink<'_>) -> Result<(), ImportError>,
-) -> Result<(), ImportError> {
-    let damaged = |rows: &RowSink<'_>, found: String| {
-        rows.fault("", "a Parquet file whose values JSON can hold", found, "write the file anew, or as JSON Lines")
-    };
-    let opened = contained(|| {
-        let opened = ParquetRecordBatchReaderBuilder::try_new(file)?.with_batch_size(BATCH);
-        let mask = match columns {
-            [] => ProjectionMask::all(),
-            names => ProjectionMask::columns(opened.parquet_schema(), names.iter().copied()),
-        };
-        opened.with_projection(mask).build()
-    });
-    let opened = opened.and_then(|opened| opened.map_err(|error| error.to_string()));
-    let mut batches = opened.map_err(|found| damaged(rows, found))?;
-    loop {
-        let batch = contained(|| batches.next().map(|batch| batch.and_then(|batch| lines(&batch))).transpose());
-        let batch = batch.and_then(|batch| batch.map_err(|error| error.to_string()));
-        let Some(lines) = batch.map_err(|found| damaged(rows, found))? else { return Ok(()) };
-        for line in lines.split(|byte| *byte == b'\n').filter(|line| !line.is_empty()) {
-            let row = serde_json::from_slice(line).map_err(|error| damaged(rows, error.to_string()))?;
-            add(row, rows)?;
+    let choose = |root: &Type, count, rows: &mut RowSink<'_>| {
+        let is_wanted = !root.is_group() || also(root.name()) || rows.mapping.reads(root.name());
+        if !is_wanted {
+            rows.mapping.leave_out(root.name(), count);
         }
-    }
+        is_wanted
+    };
+    each_batch_of(file, rows, choose, add)
 }
 
-fn lines(batch: &RecordBatch) -> Result<Vec<u8>, arrow::error::ArrowError> {
-    let mut lines = Vec::new();
-    let mut writer = WriterBuilder::new().with_explicit_nulls(true).build::<_, LineDelimited>(&mut lines);
-    writer.write(batch)?;
-    writer.finish()?;
-    drop(writer);
-    Ok(lines)
+/// The rows of a file in batches, with the columns that `choose` wants, given their types and the number of rows.
+pub(super) fn each_batch_of(
+    mut file: File,
+    rows: &mut RowSink<'_>,
+    choose: impl Fn(&Type, u64, &mut RowSink<'_>) -> bool,
+    mut add: impl FnMut(RecordBatch, &mut RowSink<'_>) -> Result<(), ImportError>,
+) -> Result<(), ImportError> {
+    let Footer { metadata, checksums: _, chunks, bytes } =
+        footer_of(&rows.file, &mut file, Extent::Pages).map_err(|finding| refused(rows, *finding))?;
+    let count = u64::try_from(metadata.file_metadata().num_rows()).unwrap_or_default();
+    let roots = metadata.file_metadata().schema_descr().root_schema().get_fields().to_vec();
+    if let Some(twice) =
+        roots.iter().enumerate().find(|(at, root)| roots[..*at].iter().any(|b| b.name() == root.name()))
+    {
+        let finding = Finding::new(Code::RepeatedColumn, &rows.file, "one column of that name", "more than one");
+        return Err(refused(rows, finding.in_column(twice.1.name())));
+    }
+    let wanted: Vec<_> = (0..roots.len()).filter(|at| choose(&roots[*at], count, rows)).collect();
+    if let Err(exceeded) = most_imported(bytes).check(count.saturating_mul(wanted.len() as u64)) {
+        return Err(refused(rows, Finding::over_budget(&rows.file, &exceeded)));
+    }
+    let opened = TableRows::open(&rows.file, file, Arc::new(metadata), chunks, Some(wanted.as_slice()));
+    for batch in opened.map_err(|finding| refused(rows, *finding))? {
+        add(batch.map_err(|finding| refused(rows, *finding))?, rows)?;
+    }
+    Ok(())
+}
+
+fn refused(rows: &RowSink<'_>, finding: Finding) -> ImportError {
+    let Finding { column, expected, found, help, .. } = finding;
+    Fault { file: rows.file.clone(), key: column, ..Fault::new(expected, found, help) }.into()
 }

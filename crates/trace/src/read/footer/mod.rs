@@ -1,6 +1,7 @@
 //! Reads footers: the positions of a file's columns, and its key-value metadata.
 
 pub(crate) mod bounds;
+pub(crate) mod folder_columns;
 pub(crate) mod trace_file;
 
 use std::fs::File;
@@ -50,9 +51,14 @@ pub(crate) struct Footer {
 }
 
 pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Finding>> {
-    let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
-    let unreadable = |error: io::Error| Finding::unreadable(&input.name, &error);
-    let mut file = input::open(&input.path).map_err(unreadable)?;
+    let mut file = input::open(&input.path).map_err(|error| Finding::unreadable(&input.name, &error))?;
+    footer_of(&input.name, &mut file, extent)
+}
+
+/// The footer of an open file of this name.
+pub(crate) fn footer_of(name: &str, file: &mut File, extent: Extent) -> Result<Footer, Box<Finding>> {
+    let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, name, expected, found));
+    let unreadable = |error: io::Error| Finding::unreadable(name, &error);
     let about = file.metadata().map_err(unreadable)?;
     if about.is_dir() {
         return Err(finding(Code::NotParquet, "a Parquet file", "a folder".into()));
@@ -61,7 +67,7 @@ pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Findin
     if bytes == 0 {
         return Err(finding(Code::EmptyFile, "a Parquet file", "0 bytes".into()));
     }
-    let start = magic(&mut file, SeekFrom::Start(0)).map_err(unreadable)?;
+    let start = magic(file, SeekFrom::Start(0)).map_err(unreadable)?;
     match start {
         Some(MAGIC) => {}
         Some(ENCRYPTED_MAGIC) => {
@@ -69,35 +75,31 @@ pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Findin
         }
         _ => return Err(finding(Code::NotParquet, "a Parquet file, which starts with `PAR1`", "another start".into())),
     }
-    let end = magic(&mut file, SeekFrom::End(-4)).map_err(unreadable)?;
+    let end = magic(file, SeekFrom::End(-4)).map_err(unreadable)?;
     if bytes < SMALLEST || end != Some(MAGIC) {
         let found = format!("{bytes} bytes that end without it");
         return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
     }
-    check_footer(&file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
+    check_footer(&*file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
     let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
-    let metadata = match contained(|| reader().parse_and_finish(&file)) {
+    let metadata = match contained(|| reader().parse_and_finish(&*file)) {
         Ok(Ok(metadata)) => metadata,
         Ok(Err(error)) => return Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
         Err(panic) => return Err(finding(Code::CorruptFooter, "a readable footer", panic)),
     };
-    let (checksums, chunks) = verified(input, &file, &metadata)?;
+    let (checksums, chunks) = verified(name, file, &metadata)?;
     Ok(Footer { bytes, metadata, checksums, chunks })
 }
 
-fn verified(
-    input: &Input,
-    file: &File,
-    metadata: &ParquetMetaData,
-) -> Result<(Checksums, ChunkChecksums), Box<Finding>> {
+fn verified(name: &str, file: &File, metadata: &ParquetMetaData) -> Result<(Checksums, ChunkChecksums), Box<Finding>> {
     let Some((start, footer)) = footer_bytes(file) else { return Ok(<_>::default()) };
     let mut chunks = metadata.row_groups().iter().flat_map(RowGroupMetaData::columns);
     if chunks.any(|chunk| checksums::range(chunk).is_none_or(|(_, end)| end > start)) {
         let (expected, found) = ("columns that lie before the footer", "one that lies behind its start");
-        return Err(Box::new(Finding::new(Code::CorruptFooter, &input.name, expected, found)));
+        return Err(Box::new(Finding::new(Code::CorruptFooter, name, expected, found)));
     }
     checksums::of_file(file, (start, &footer), metadata).map_err(|fault| {
-        let finding = |code, expected: String, found| Box::new(Finding::new(code, &input.name, expected, found));
+        let finding = |code, expected: String, found| Box::new(Finding::new(code, name, expected, found));
         match fault {
             Fault::Malformed(found) => {
                 let expected = format!("`{CHECKSUMS_KEY}` to hold a CRC-32 of each column chunk and of the footer");
@@ -110,7 +112,7 @@ fn verified(
                 let expected = format!("a footer with the CRC-32 {expected:08x}");
                 finding(Code::CorruptFooter, expected, format!("{found:08x}"))
             }
-            Fault::Unreadable(why) => Finding::unreadable(&input.name, &why),
+            Fault::Unreadable(why) => Finding::unreadable(name, &why),
         }
     })
 }

@@ -17,6 +17,7 @@ use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 use serde_json::Value;
 
+use super::folder_columns::{FolderColumn, folder_columns};
 use super::{Extent, Footer, bounds, footer, plain};
 use crate::catch_panic::contained;
 use crate::declared_experiment::{self, DeclaredExperiment};
@@ -40,6 +41,7 @@ pub struct TraceFile {
     version: u32,
     domain: Domain,
     columns: Vec<FileColumn>,
+    folders: Vec<FolderColumn>,
     rows: Vec<usize>,
     pub(crate) pairs: Vec<KeyValue>,
     pub(crate) colors: DeclaredPalette,
@@ -74,8 +76,12 @@ impl TraceFile {
         let mut pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
         let recording = footers::recording(value(&pairs, schema::RECORDING_KEY));
         let absent = declared_experiment::absent(&input.name, &recording);
-        let domain = Domain::of_file(|name| columns.iter().any(|column| column.name == name), &recording);
-        let mut findings = check_columns(&input.name, &columns, version, domain, &absent);
+        let is_own = value(&pairs, schema::WRITER_KEY).is_some() || !recording.is_null();
+        let folders = if is_own { Ok(Vec::new()) } else { folder_columns(&input.name, &input.path) };
+        let folders = folders.map_err(|finding| vec![*finding])?;
+        let all = with_folders(&columns, &folders);
+        let domain = Domain::of_file(|name| all.iter().any(|column| column.name == name), &recording);
+        let mut findings = check_columns(&input.name, &all, version, domain, &absent);
         findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {
             return Err(findings);
@@ -95,6 +101,7 @@ impl TraceFile {
             version,
             domain,
             columns,
+            folders,
             rows,
             pairs,
             colors,
@@ -136,7 +143,10 @@ impl TraceFile {
     pub(crate) fn strangeness(&self) -> Vec<Finding> {
         match self.domain {
             Domain::Mirror => Vec::new(),
-            Domain::Own => check_columns(self.name(), &self.columns, self.version, Domain::Mirror, &[]),
+            Domain::Own => {
+                let all = with_folders(&self.columns, &self.folders);
+                check_columns(self.name(), &all, self.version, Domain::Mirror, &[])
+            }
         }
     }
 
@@ -149,12 +159,26 @@ impl TraceFile {
         declared.iter().filter_map(fault).collect()
     }
 
+    /// The columns in the file itself.
     pub fn columns(&self) -> &[FileColumn] {
         &self.columns
     }
 
+    /// The columns in the names of its folders.
+    pub fn folders(&self) -> &[FolderColumn] {
+        &self.folders
+    }
+
+    /// The column that only the name of a folder has.
+    pub fn folder(&self, name: &str) -> Option<&FolderColumn> {
+        let is_absent = || !self.columns.iter().any(|column| column.name == name);
+        self.folders.iter().find(|folder| folder.column.name == name).filter(|_| is_absent())
+    }
+
+    /// A column of the file or, if it has none of the name, of its folders.
     pub fn column(&self, name: &str) -> Option<&FileColumn> {
-        self.columns.iter().find(|column| column.name == name)
+        let all = self.columns.iter().chain(self.folders.iter().map(|folder| &folder.column));
+        all.into_iter().find(|column| column.name == name)
     }
 
     /// Returns true if the file has the schema's column of this name. A trace of an older version may have an own
@@ -223,6 +247,11 @@ impl TraceFile {
         let expected = "the file as it was when it was opened";
         Err(Box::new(Finding::new(Code::Unreadable, self.name(), expected, "another one in its place")))
     }
+}
+
+fn with_folders(columns: &[FileColumn], folders: &[FolderColumn]) -> Vec<FileColumn> {
+    let is_new = |folder: &&FolderColumn| columns.iter().all(|column| column.name != folder.column.name);
+    columns.iter().chain(folders.iter().filter(is_new).map(|folder| &folder.column)).cloned().collect()
 }
 
 fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {

@@ -2,11 +2,16 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use serde_json::{Map, Value, json};
+use ::parquet::schema::types::Type;
+use arrow::array::{Array as _, ArrayRef, AsArray as _, Float64Array, Int64Array, StringArray};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Int64Type};
+use serde_json::{Map, Value};
 
 use super::super::{RowSink, parquet};
-use super::read_frames;
+use super::{Columns, integers, read_frames};
 use crate::import::error::ImportError;
 use crate::inputs::{Input, traces_at};
 use exact::budget::Limit;
@@ -40,16 +45,22 @@ pub(in crate::import) fn read_folder(folder: &Path, rows: &mut RowSink<'_>) -> R
     let mut left = frames_of_episodes(folder, rows)?;
     for path in below(folder, "data")? {
         each_file(&path, rows, |file, rows| {
-            read_frames(file, rows, |frame| {
-                let number = |key: &str| frame.get(key).and_then(Value::as_i64);
-                let task = number("task_index").and_then(|index| tasks.get(&index));
-                if let Some(frames) = number("episode_index").and_then(|episode| left.get_mut(&episode)) {
-                    *frames -= 1;
+            read_frames(file, rows, |mut columns| {
+                for episode in numbers(&columns, "episode_index").iter().flatten() {
+                    if let Some(frames) = left.get_mut(&episode) {
+                        *frames -= 1;
+                    }
                 }
-                let own = constants.clone().into_iter().chain(task.map(|task| ("task".to_owned(), json!(task))));
-                for (key, value) in own.filter(|(key, _)| !frame.contains_key(key)).collect::<Vec<_>>() {
-                    frame.insert(key, value);
+                let indices = numbers(&columns, "task_index");
+                let task = |index: Option<i64>| tasks.get(&index?).map(String::as_str);
+                let task =
+                    (!tasks.is_empty()).then(|| Arc::new(indices.iter().map(task).collect::<StringArray>()) as _);
+                let rows = columns["t"].len();
+                let constants = constants.iter().map(|(name, value)| (name.clone(), repeated(value, rows)));
+                for (name, values) in constants.chain(task.map(|task| ("task".to_owned(), task))) {
+                    columns.entry(name).or_insert(values);
                 }
+                columns
             })
         })?;
     }
@@ -57,6 +68,12 @@ pub(in crate::import) fn read_folder(folder: &Path, rows: &mut RowSink<'_>) -> R
     let found = if frames > 0 { format!("{frames} fewer") } else { format!("{} more", -frames) };
     let help = "copy the data set again, or name the files below `data` that are to be imported";
     Err(rows.fault("data", &format!("the frames of episode {episode}, as `meta/episodes` counts them"), found, help))
+}
+
+/// The bytes of the frames.
+pub(in crate::import) fn bytes_of(folder: &Path) -> Result<u64, ImportError> {
+    let bytes = |path: PathBuf| path.metadata().map(|about| about.len()).unwrap_or_default();
+    Ok(below(folder, "data")?.into_iter().map(bytes).sum())
 }
 
 /// The values in `meta/info.json` that apply to all frames.
@@ -76,15 +93,33 @@ fn constants(folder: &Path, rows: &RowSink<'_>) -> Result<Map<String, Value>, Im
     Ok(known.into_iter().filter(|(_, value)| !value.is_null()).collect())
 }
 
+/// A constant of the data set in each of its rows.
+fn repeated(value: &Value, rows: usize) -> ArrayRef {
+    match (value.as_i64(), value.as_f64(), value.as_str()) {
+        (Some(number), ..) => Arc::new(Int64Array::from_value(number, rows)),
+        (_, Some(number), _) => Arc::new(Float64Array::from_value(number, rows)),
+        (.., text) => Arc::new(StringArray::from(vec![text; rows])),
+    }
+}
+
+fn numbers(columns: &Columns, name: &str) -> Int64Array {
+    let column = columns.get(name).filter(|column| column.data_type().is_integer());
+    let numbers = column.and_then(|column| cast(column, &DataType::Int64).ok());
+    numbers
+        .map_or_else(|| Int64Array::new_null(columns["t"].len()), |numbers| numbers.as_primitive::<Int64Type>().clone())
+}
+
 /// Tasks by number. Pandas names the column of texts `__index_level_0__` if it has no name.
 fn tasks(folder: &Path, rows: &mut RowSink<'_>) -> Result<BTreeMap<i64, String>, ImportError> {
     let mut tasks = BTreeMap::new();
     let path = folder.join("meta/tasks.parquet");
     if path.is_file() {
         each_file(&path, rows, |file, rows| {
-            parquet::each_row(file, rows, |row, _| {
-                let text = row.values().find_map(Value::as_str);
-                tasks.extend(row.get("task_index").and_then(Value::as_i64).zip(text.map(str::to_owned)));
+            parquet::each_batch(file, rows, &|_| false, |batch, _| {
+                let text = batch.columns().iter().find_map(|column| column.as_string_opt::<i32>());
+                let pairs = integers(&batch, "task_index").zip(text);
+                let pairs = pairs.iter().flat_map(|(numbers, texts)| numbers.iter().zip(texts.iter()));
+                tasks.extend(pairs.filter_map(|(number, text)| Some((number?, text?.to_owned()))));
                 Ok(())
             })
         })?;
@@ -97,9 +132,11 @@ fn frames_of_episodes(folder: &Path, rows: &mut RowSink<'_>) -> Result<BTreeMap<
     let mut lengths = BTreeMap::new();
     for path in below(folder, "meta/episodes")? {
         each_file(&path, rows, |file, rows| {
-            parquet::each_row_of(file, rows, &["episode_index", "length"], |row, _| {
-                let number = |key: &str| row.get(key).and_then(Value::as_i64);
-                lengths.extend(number("episode_index").zip(number("length")));
+            let choose = |root: &Type, _, _: &mut RowSink<'_>| ["episode_index", "length"].contains(&root.name());
+            parquet::each_batch_of(file, rows, choose, |batch, _| {
+                let pairs = integers(&batch, "episode_index").zip(integers(&batch, "length"));
+                let pairs = pairs.iter().flat_map(|(episodes, lengths)| episodes.iter().zip(lengths));
+                lengths.extend(pairs.filter_map(|(episode, length)| episode.zip(length)));
                 Ok(())
             })
         })?;

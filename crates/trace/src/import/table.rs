@@ -1,0 +1,147 @@
+//! Columns of tables as the values of rows, unchanged: numbers keep their value, infinities and NaN included.
+//!
+//! What is neither a number nor a truth value becomes text, such as `2026-01-01T00:00:00Z` of a time in any zone.
+
+use std::sync::Arc;
+
+use arrow::array::{Array, ArrayRef, AsArray as _, StringArray, UInt32Array};
+use arrow::compute::{cast, take};
+use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type, UInt64Type};
+use arrow::error::ArrowError;
+use arrow::util::display::{ArrayFormatter, FormatOptions};
+
+use super::line::LineValue;
+use super::mapping::Node;
+
+/// A column whose values are of the few types that rows have.
+#[derive(Clone, Debug)]
+pub(super) struct RowValues {
+    values: ArrayRef,
+    /// True for decimal numbers, whose type follows from all of them.
+    are_cells: bool,
+}
+
+impl RowValues {
+    pub(super) fn new(column: &ArrayRef) -> Result<Self, ArrowError> {
+        let are_cells = column.data_type().is_decimal();
+        plain(column).map(|values| Self { values, are_cells })
+    }
+
+    /// The value of a row. Errors: text that is not UTF-8, with its length up to there.
+    pub(super) fn at(&self, row: usize) -> Result<LineValue, usize> {
+        Ok(match value(self.values.as_ref(), row)? {
+            LineValue::Text(text) if self.are_cells => LineValue::Cell(text),
+            value => value,
+        })
+    }
+}
+
+fn plain(column: &ArrayRef) -> Result<ArrayRef, ArrowError> {
+    match column.data_type() {
+        DataType::UInt64 => Ok(Arc::clone(column)),
+        integer if integer.is_integer() => cast(column, &DataType::Int64),
+        float if float.is_floating() => cast(column, &DataType::Float64),
+        DataType::LargeUtf8 | DataType::Utf8View => cast(column, &DataType::Utf8),
+        DataType::Null | DataType::Boolean | DataType::Utf8 | DataType::Dictionary(..) => Ok(Arc::clone(column)),
+        nested if nested.is_nested() => Ok(Arc::clone(column)),
+        // The same instant: names of zones need a table of zones.
+        DataType::Timestamp(unit, Some(zone)) if **zone != *"+00:00" => {
+            texts(&cast(column, &DataType::Timestamp(*unit, Some("+00:00".into())))?)
+        }
+        _ => texts(column),
+    }
+}
+
+fn texts(column: &ArrayRef) -> Result<ArrayRef, ArrowError> {
+    let options = FormatOptions::default().with_display_error(false);
+    let shown = ArrayFormatter::try_new(column, &options)?;
+    let text = |row| column.is_valid(row).then(|| shown.value(row).try_to_string()).transpose();
+    Ok(Arc::new((0..column.len()).map(text).collect::<Result<StringArray, _>>()?))
+}
+
+fn value(values: &dyn Array, row: usize) -> Result<LineValue, usize> {
+    if values.is_null(row) {
+        return Ok(LineValue::Null);
+    }
+    Ok(match values.data_type() {
+        DataType::Null => LineValue::Null,
+        DataType::Boolean => LineValue::Bool(values.as_boolean().value(row)),
+        DataType::Int64 => LineValue::Int(values.as_primitive::<Int64Type>().value(row)),
+        DataType::UInt64 => {
+            let number = values.as_primitive::<UInt64Type>().value(row);
+            i64::try_from(number).map_or(LineValue::LargeInt(number), LineValue::Int)
+        }
+        DataType::Float64 => LineValue::Float(values.as_primitive::<Float64Type>().value(row)),
+        DataType::Utf8 => LineValue::Text(text(values.as_string(), row)?),
+        DataType::Dictionary(..) => {
+            let keys = values.as_dictionary::<Int32Type>();
+            let key = keys.key(row).filter(|key| *key < keys.values().len()).ok_or(0_usize)?;
+            return value(keys.values().as_ref(), key);
+        }
+        DataType::Struct(_) | DataType::Map(..) => LineValue::Object(Vec::new()),
+        _ => LineValue::List,
+    })
+}
+
+/// The decoder does not check that text with only a JSON annotation is UTF-8.
+fn text(texts: &StringArray, row: usize) -> Result<String, usize> {
+    let ends = [texts.value_offsets()[row], texts.value_offsets()[row + 1]];
+    let [start, end] = ends.map(|end| usize::try_from(end).unwrap_or_default());
+    let text = std::str::from_utf8(&texts.value_data()[start..end]).map_err(|error| error.valid_up_to())?;
+    Ok(text.to_owned())
+}
+
+/// A column inside a column of structs, lists or maps; null in rows without the part.
+impl Node for ArrayRef {
+    fn member(&self, key: &str) -> Option<Self> {
+        match self.data_type() {
+            DataType::Struct(_) => {
+                let parts = self.as_struct();
+                let member = parts.column_by_name(key)?;
+                let rows: UInt32Array = rows(self, |row| Some(row));
+                take(member, &rows, None).ok()
+            }
+            DataType::Map(..) => {
+                let map = self.as_map();
+                let keys = cast(map.keys(), &DataType::Utf8).ok()?;
+                let keys = keys.as_string::<i32>();
+                let found = |row: usize| {
+                    let ends = &map.value_offsets()[row..=row + 1];
+                    (ends[0]..ends[1]).filter_map(|at| usize::try_from(at).ok()).find(|at| keys.value(*at) == key)
+                };
+                take(map.values(), &rows(self, found), None).ok()
+            }
+            _ => None,
+        }
+    }
+
+    fn item(&self, position: usize) -> Option<Self> {
+        match self.data_type() {
+            DataType::List(_) => {
+                let list = self.as_list::<i32>();
+                let found = |row: usize| {
+                    let start = usize::try_from(list.value_offsets()[row]).ok()?;
+                    (position < list.value(row).len()).then_some(start + position)
+                };
+                take(list.values(), &rows(self, found), None).ok()
+            }
+            DataType::LargeList(_) => cast(self, &smaller(self)?).ok()?.item(position),
+            DataType::FixedSizeList(..) => cast(self, &smaller(self)?).ok()?.item(position),
+            _ => None,
+        }
+    }
+}
+
+/// The type of lists with the same items.
+fn smaller(list: &ArrayRef) -> Option<DataType> {
+    match list.data_type() {
+        DataType::LargeList(item) | DataType::FixedSizeList(item, _) => Some(DataType::List(Arc::clone(item))),
+        _ => None,
+    }
+}
+
+/// The positions of values that rows have; null for rows that are null themselves.
+fn rows(column: &ArrayRef, find: impl Fn(usize) -> Option<usize>) -> UInt32Array {
+    let found = |row| if column.is_valid(row) { find(row).and_then(|at| u32::try_from(at).ok()) } else { None };
+    (0..column.len()).map(found).collect()
+}

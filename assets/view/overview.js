@@ -159,7 +159,7 @@ function ranking({ metric, experiments, rows }) {
 
 /** The page. */
 export async function overview(content, study) {
-  const head = make("div", { id: "overview-head" }, make("h1", {}, "Mirror self-recognition"));
+  const head = make("div", { id: "overview-head" }, make("h1", {}, study.subject ?? "Results"));
   const sections = make("div", { id: "sections" });
   const filters = filterLine(study);
   content.replaceChildren(head, filters, sections);

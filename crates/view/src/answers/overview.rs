@@ -25,6 +25,7 @@ pub(crate) fn study(snapshot: &Snapshot) -> Value {
         "generation": snapshot.generation,
         "episodes": table.len(),
         "definitions": {"name": visible(&table.catalog.name), "hash": table.catalog.hash},
+        "subject": visible(&table.catalog.subject()),
         "against": snapshot.options.against.as_deref().map(named),
         "where": snapshot.options.question.filter,
         "choices": choices(scored),

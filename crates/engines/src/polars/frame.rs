@@ -54,15 +54,7 @@ impl FrameColumn {
 
     fn of(&self, file: &TraceFile) -> Expr {
         let present = file.column(&self.name).is_some_and(|column| column.kind.is_some());
-        let values = match file.folder(&self.name) {
-            Some(folder) => match folder.value().map(|text| (text, text.parse::<i64>())) {
-                Some((_, Ok(number))) if folder.column.kind == Some(Kind::Int) => lit(number),
-                Some((text, _)) => lit(text.to_owned()),
-                None => lit(NULL),
-            },
-            None if present => col(self.name.as_str()),
-            None => lit(NULL),
-        };
+        let values = if present { col(self.name.as_str()) } else { lit(NULL) };
         values.strict_cast(self.data_type()).alias(self.name.as_str())
     }
 }
@@ -73,6 +65,13 @@ pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, Po
     verify_pages(traces).map_err(ScoreError::from)?;
     let (labels, read): (Vec<&FrameColumn>, Vec<&FrameColumn>) =
         columns.iter().partition(|column| traces.is_label_column(&column.name));
+    for file in traces.files() {
+        if let Some(column) = read.iter().find(|column| file.folder(&column.name).is_some()) {
+            let expected = format!("{}: expected the column `{}` in the file", file.name(), column.name);
+            let help = "use --engine native, or `mirrorstats import` the files first";
+            return Err(PolarsError::Failed(format!("{expected}, found it in the name of a folder\n  help: {help}")));
+        }
+    }
     let frames = traces.files().iter().map(|file| scan(file, &read)).collect::<Result<Vec<_>, _>>()?;
     let frame = concat(frames, UnionArgs { rechunk: false, ..UnionArgs::default() })?;
     let labels: Vec<Expr> = labels.into_iter().map(|column| label(traces.labels(), &column.name)).collect();

@@ -83,7 +83,7 @@ fn listed(told: &[Fault], more: usize) -> String {
              --map; see docs/how-to/domains.md\n"
         )
     });
-    let of_mirror = |fault: &&Fault| !is_other || fault.key.as_deref().is_none_or(is_general);
+    let of_mirror = |fault: &&Fault| !is_other || fault.found != "none" || fault.key.as_deref().is_none_or(is_general);
     // A value that is there says more than one that is missing.
     let (missing, wrong): (Vec<&Fault>, Vec<&Fault>) = told.iter().filter(of_mirror).partition(|it| it.found == "none");
     let shown: Vec<String> = wrong.into_iter().chain(missing).take(SHOWN).map(ToString::to_string).collect();

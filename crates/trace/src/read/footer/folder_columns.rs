@@ -52,11 +52,6 @@ impl FolderColumn {
         take(&cast(&one, held)?, &UInt32Array::from_value(0, rows), None)
     }
 
-    /// The value as text; `None` for null.
-    pub fn value(&self) -> Option<&str> {
-        self.value.as_deref()
-    }
-
     /// The finding for a row of the file's own column that has another value.
     pub(crate) fn contradiction(&self, file: &str, column: &Column) -> Option<Finding> {
         let value = self.value.as_deref()?;

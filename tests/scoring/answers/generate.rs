@@ -79,7 +79,7 @@ impl Generator {
 
     fn from(&mut self) -> From {
         let both = || [Self::named("s.", &STEPS), Self::named("e.", &EPISODES)].concat();
-        let (text, columns) = match self.draw.below(12) {
+        let (text, columns) = match self.draw.below(11) {
             0..=2 => ("steps".to_owned(), Self::named("", &STEPS)),
             3 => ("steps AS s".to_owned(), Self::named("s.", &STEPS)),
             4 => ("episodes".to_owned(), Self::named("", &EPISODES)),
@@ -103,11 +103,7 @@ impl Generator {
                 let columns = [Self::named("", &STEPS), Self::named("e.", &EPISODES[1..])].concat();
                 (format!("steps {how} episodes e USING (episode_id)"), columns)
             }
-            8 => (
-                "episodes s CROSS JOIN episodes e".to_owned(),
-                [Self::named("s.", &EPISODES), Self::named("e.", &EPISODES)].concat(),
-            ),
-            9 => {
+            8 => {
                 let text = "(SELECT episode_id AS id, count(*) AS n, sum(j) AS total, avg(x) AS mean, max(s) AS s FROM steps GROUP BY episode_id) AS d";
                 let columns = [
                     ("id", Kind::Text),
@@ -118,7 +114,7 @@ impl Generator {
                 ];
                 (text.to_owned(), Self::named("", &columns))
             }
-            10 => {
+            9 => {
                 let text = "(SELECT j, x FROM steps WHERE b UNION ALL SELECT seed, rate FROM episodes) u";
                 (text.to_owned(), Self::named("u.", &[("j", Kind::Int), ("x", Kind::Float)]))
             }

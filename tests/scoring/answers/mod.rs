@@ -170,6 +170,7 @@ fn shapes_without_an_equal_answer_are_refused_by_name() {
         ("SELECT CAST(2.5 AS INTEGER) AS c", "`CAST(2.5 AS INTEGER)` of DECIMAL"),
         ("SELECT 7 % n FROM steps", "`7 % n` of BIGINT, BIGINT"),
         ("SELECT a.t FROM steps a JOIN steps b ON a.t < b.t", "`ON a.t < b.t`"),
+        ("SELECT a.t FROM steps a CROSS JOIN steps b WHERE a.t < b.t", "CROSS JOIN"),
         ("SELECT a.t FROM steps a NATURAL JOIN steps b", "NATURAL JOIN"),
         ("SELECT sum(x) OVER (ORDER BY t ROWS BETWEEN 1 PRECEDING AND CURRENT ROW) FROM steps", "ROWS BETWEEN"),
         ("SELECT median(x) OVER (ORDER BY t) FROM steps", "median"),

@@ -29,8 +29,9 @@ const FILE: &str = "mirrorstats.toml";
 pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
 const PREFIX: &str = "MIRRORSTATS_";
 const OWN_PROMPT: &str = "a prompt belongs to an experiment: name a file with `experiment = \"own.toml\"`, and write into it \
-                          `[experiment.E1-short]` with `scenes = \"E1\"` and `prompt = \"short\"`, a folder beside it; \
-                          `mirrorstats experiments explain E1 --prompt` prints a prompt to start from";
+                          `[experiment.SHORT]` with `scenes = \"NAME\"` of the experiment to compare with and \
+                          `prompt = \"short\"`, a folder beside it; `mirrorstats experiments explain NAME --prompt` prints a \
+                          prompt to start from";
 const LARGEST: Limit = Limit::new("bytes of a configuration file", 1 << 20);
 
 /// The source of a setting.

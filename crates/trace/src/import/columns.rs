@@ -48,9 +48,9 @@ impl Columns {
     ///
     /// Columns in the names of folders are added; a different value in the row is a fault.
     pub(super) fn typed(&self, members: Members, folders: &Members, limits: Limits<'_>) -> (Members, Option<Fault>) {
-        let mut members = self.with_types(members, limits);
+        let mut members = Self::with_types(members, limits);
         let mut fault = None;
-        for (key, value) in self.with_types(folders.clone(), limits) {
+        for (key, value) in Self::with_types(folders.clone(), limits) {
             match members.iter().find(|(name, _)| *name == key) {
                 None => members.push((key, value)),
                 Some((_, found)) if is_same(found, &value) => {}
@@ -64,7 +64,7 @@ impl Columns {
         (members, fault)
     }
 
-    fn with_types(&self, mut members: Members, limits: Limits<'_>) -> Members {
+    fn with_types(mut members: Members, limits: Limits<'_>) -> Members {
         let Limits { expected, .. } = limits;
         let declared = |key: &str| expected.declared.iter().find(|declared| declared.name == key);
         for (key, value) in &mut members {

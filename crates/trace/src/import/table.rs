@@ -98,7 +98,7 @@ impl Node for ArrayRef {
             DataType::Struct(_) => {
                 let parts = self.as_struct();
                 let member = parts.column_by_name(key)?;
-                let rows: UInt32Array = rows(self, |row| Some(row));
+                let rows: UInt32Array = rows(self, Some);
                 take(member, &rows, None).ok()
             }
             DataType::Map(..) => {
@@ -125,8 +125,7 @@ impl Node for ArrayRef {
                 };
                 take(list.values(), &rows(self, found), None).ok()
             }
-            DataType::LargeList(_) => cast(self, &smaller(self)?).ok()?.item(position),
-            DataType::FixedSizeList(..) => cast(self, &smaller(self)?).ok()?.item(position),
+            DataType::LargeList(_) | DataType::FixedSizeList(..) => cast(self, &smaller(self)?).ok()?.item(position),
             _ => None,
         }
     }

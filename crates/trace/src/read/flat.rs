@@ -80,7 +80,7 @@ impl TableRows {
 /// are written out.
 fn with_keys(field: &FieldRef) -> FieldRef {
     let keyed = match field.data_type() {
-        DataType::Struct(parts) => DataType::Struct(parts.iter().map(|part| keyed(part)).collect()),
+        DataType::Struct(parts) => DataType::Struct(parts.iter().map(keyed).collect()),
         DataType::List(item) => DataType::List(keyed(item)),
         DataType::Map(entries, is_sorted) => DataType::Map(with_keys(entries), *is_sorted),
         _ => return Arc::clone(field),

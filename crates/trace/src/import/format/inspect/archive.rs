@@ -96,7 +96,9 @@ impl EvalArchive {
             ["header.json", "summaries.json", "reductions.json"].contains(&name) || name.starts_with("_journal/")
         };
         let others = self.names.iter().filter(|name| !parts.contains(name) && !is_known(name) && !name.ends_with('/'));
-        others.cloned().partition(|name| name.starts_with(SAMPLES) && name.ends_with(".json"))
+        others
+            .cloned()
+            .partition(|name| name.strip_prefix(SAMPLES).is_some_and(|rest| rest.strip_suffix(".json").is_some()))
     }
 
     /// The members of a chunked sample, but the one that heads it.

@@ -170,7 +170,7 @@ fn a_template_has_a_limit_of_work_and_length() {
     fs::write(at.join("system.txt"), "s").unwrap();
     fs::write(at.join("user.txt"), "{{ history_text }}").unwrap();
     let nested = |depth: usize, inside: &str| {
-        let open: String = (0..depth).map(|at| format!("{{% for a{at} in steps %}}")).collect();
+        let open = (0..depth).map(|at| format!("{{% for a{at} in steps %}}")).collect::<Vec<_>>().concat();
         format!("{open}{inside}{}", "{% endfor %}".repeat(depth))
     };
     let rendered = |history: String, thought: &str| {

@@ -178,7 +178,7 @@ fn no_verb_and_no_format_for_people_prints_a_name_raw() {
         let is_cut = words.contains("github") && !answer.stdout.contains("\\u{1b}");
         assert!(!is_cut, "the flipped episodes are named: {}", answer.stdout);
     }
-    let missing = missing(SHOWN.into_iter().chain(NOT_SHOWN));
+    let missing = missing(&SHOWN.into_iter().chain(NOT_SHOWN));
     assert!(missing.is_empty(), "no trace with hostile names: {missing:?}");
 }
 

@@ -81,7 +81,8 @@ fn packages(tables: &[PathBuf]) -> BTreeSet<String> {
 
 fn compile(at: &Path, encoding: &str, tables: &[PathBuf]) {
     let packages: Vec<String> = packages(tables).into_iter().collect();
-    let inputs: String = tables.iter().map(|path| format!("\\input{{{}}}\n\\clearpage\n", path.display())).collect();
+    let inputs =
+        tables.iter().map(|path| format!("\\input{{{}}}\n\\clearpage\n", path.display())).collect::<Vec<_>>().concat();
     let document = format!(
         "\\documentclass{{article}}\n\\usepackage[{encoding}]{{fontenc}}\n{}\n\\begin{{document}}\n{inputs}\\end{{document}}\n",
         packages.join("\n")

@@ -140,8 +140,8 @@ impl Question<'_> {
                 }
                 has_mean |= sums.0 <= sums.1;
                 let [low, high] = sample.means_beside(&print);
-                below.extend(low.map(|mean| mean.units()));
-                above.extend(high.map(|mean| mean.units()));
+                below.extend(low.map(Decimal::units));
+                above.extend(high.map(Decimal::units));
             }
         }
         if has_mean {

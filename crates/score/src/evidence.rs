@@ -335,7 +335,7 @@ fn decided(timesteps: &[i64]) -> String {
 
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", visible(&self.episode_id), counted(self.length as u64, "step"))?;
+        write!(f, "{}: {}", visible(&self.episode_id), counted(self.length.unsigned_abs(), "step"))?;
         for metric in &self.metrics {
             let value = metric.value.map_or_else(|| "undefined".to_owned(), |value| value.to_string());
             write!(f, "\n\n{} = {value}   decided at {}", metric.metric, decided(&metric.timesteps))?;

@@ -57,7 +57,7 @@ impl Study {
                 exports.push_str(&self.export(name));
                 sql_text(&format!("{name}.parquet"))
             };
-            views.push_str(&format!("CREATE VIEW {name} AS SELECT * FROM {from}; "));
+            views.extend(["CREATE VIEW ", name, " AS SELECT * FROM ", &from, "; "]);
         }
         format!("run it in DuckDB: {exports}duckdb -c {}", shell_text(&format!("{views}{}", query.on_one_line())))
     }
@@ -67,11 +67,11 @@ impl Study {
         let option = |name: &str, value: Option<String>| {
             value.map(|value| format!(" {name} {}", shell_text(&value))).unwrap_or_default()
         };
-        let files: String =
-            self.inputs.iter().map(|input| format!(" {}", shell_text(&input.path.to_string_lossy()))).collect();
+        let names = self.inputs.iter().map(|input| shell_text(&input.path.to_string_lossy())).collect::<Vec<_>>();
+        let files = names.join(" ");
         let definitions = question.definitions.as_ref().map(|name| name.to_string_lossy().into_owned());
         format!(
-            "mirrorstats query {}{files}{}{}{} -o {table}.parquet && ",
+            "mirrorstats query {} {files}{}{}{} -o {table}.parquet && ",
             shell_text(&format!("SELECT * FROM {table}")),
             option("--definitions", definitions),
             option("--metrics", question.metrics.as_ref().map(|names| names.join(","))),

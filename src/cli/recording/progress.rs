@@ -149,7 +149,8 @@ impl<'a> Bar<'a> {
         }
         *told = Instant::now();
         let (message, steps, rate) = (self.message(), self.line.position(), rate(self.line.per_sec()));
-        let left = self.known.load(Ordering::Relaxed).then(|| time_left(self.line.eta())).unwrap_or_default();
+        let is_known = self.known.load(Ordering::Relaxed);
+        let left = if is_known { time_left(self.line.eta()) } else { String::new() };
         // If standard error is closed, the message cannot be shown.
         let _ = writeln!(io::stderr(), "{message}, {steps} steps{rate}{left}");
     }

@@ -93,8 +93,8 @@ fn a_key_echoed_by_the_server_is_not_printed_or_stored() {
 
 #[test]
 fn a_key_in_another_form_is_not_printed_or_stored() {
-    let hex: String = KEY.bytes().map(|byte| format!("{byte:02X}")).collect();
-    let percent: String = KEY.bytes().map(|byte| format!("%{byte:02x}")).collect();
+    let hex = KEY.bytes().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().concat();
+    let percent = KEY.bytes().map(|byte| format!("%{byte:02x}")).collect::<Vec<_>>().concat();
     let reversed: String = KEY.chars().rev().collect();
     let forms = [hex.to_lowercase(), hex, percent, reversed, STANDARD.encode(KEY), URL_SAFE_NO_PAD.encode(KEY)];
     for form in &forms {

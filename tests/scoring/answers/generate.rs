@@ -363,10 +363,10 @@ impl Generator {
                 (format!("WITH w AS ({inner}) SELECT {names} FROM w"), columns)
             }
         };
-        self.finished(sql, columns)
+        self.finished(&sql, columns)
     }
 
-    fn finished(&mut self, sql: String, columns: usize) -> Statement {
+    fn finished(&mut self, sql: &str, columns: usize) -> Statement {
         let ordered = self.draw.one_in(2);
         let order = if ordered { self.order(columns) } else { String::new() };
         Statement { sql: format!("{sql}{order}"), ordered }
@@ -374,17 +374,18 @@ impl Generator {
 
     fn rows(&mut self, from: &str) -> (String, usize) {
         let distinct = self.draw.of(&["", "", "DISTINCT "]);
-        let items: Vec<String> = (0..1 + self.draw.below(3)).map(|at| format!("{} AS c{at}", self.any(3))).collect();
+        let items: Vec<String> = (0..=self.draw.below(3)).map(|at| format!("{} AS c{at}", self.any(3))).collect();
         (format!("SELECT {distinct}{} FROM {from}{}", items.join(", "), self.condition_of("WHERE")), items.len())
     }
 
     fn groups(&mut self, from: &str) -> (String, usize) {
-        let keys: Vec<String> = (0..self.draw.below(3)).map(|_| self.any(usize::from(self.draw.0 % 3 == 0))).collect();
+        let keys: Vec<String> =
+            (0..self.draw.below(3)).map(|_| self.any(usize::from(self.draw.0.is_multiple_of(3)))).collect();
         // A literal in GROUP BY is the number of a column.
         let keys: Vec<String> =
             keys.into_iter().filter(|key| self.columns.iter().any(|(name, _)| key.contains(name.as_str()))).collect();
         let mut items: Vec<String> = keys.iter().enumerate().map(|(at, key)| format!("{key} AS k{at}")).collect();
-        for at in 0..1 + self.draw.below(3) {
+        for at in 0..=self.draw.below(3) {
             items.push(format!("{} AS a{at}", self.aggregate(2)));
         }
         let having = if self.draw.one_in(4) {
@@ -479,7 +480,7 @@ impl Generator {
             }
             _ => format!("SELECT t, {} AS c FROM steps", self.window(signature)),
         };
-        self.finished(sql, 2)
+        self.finished(&sql, 2)
     }
 
     /// One statement for each cast.

@@ -77,7 +77,7 @@ fn errors_limits_and_pooled_messages_are_imported() {
     let at = folder.path();
     let mapped = ["--map", "last=event.input.2.content", "--map", "sent=event.call.request.messages.0.content"];
     import(at, "logs/hasty.eval", &mapped).ends(0);
-    let failed = queried(at, "case when error is null then '' else concat(tool, ': ', error) end, score, t");
+    let failed = queried(at, "case when error is null then '' else tool || ': ' || error end, score, t");
     assert!(failed.iter().any(|row| row.starts_with("look_up: locked") || row.contains("look_up: ")), "{failed:?}");
     let rows = queried(at, "seed, run, t, kind, last, sent");
     assert_eq!(rows[2], "1,1,3,model,unknown,1 + 2?");

@@ -230,8 +230,8 @@ fn scores_are_the_numbers_that_inspect_counts() {
         scores.iter().zip(1..).map(|(scores, id)| sample(&json!(id), &[], &json!({ "scores": scores }))).collect();
     json_log(&at.join("log.json"), &samples);
     let text = fs::read_to_string(at.join("log.json")).unwrap();
-    let scorers = r#""eval_id":"e","scorers":[{"name":"inspect_ai/s"},{"name":"other"}]"#;
-    fs::write(at.join("log.json"), text.replace("\"INFINITE\"", "-Infinity").replace("\"eval_id\":\"e\"", scorers))
+    let header = r#""eval_id":"e","scorers":[{"name":"inspect_ai/s"},{"name":"other"}]"#;
+    fs::write(at.join("log.json"), text.replace("\"INFINITE\"", "-Infinity").replace("\"eval_id\":\"e\"", header))
         .unwrap();
     let told = import(at, "log.json", &[]).ends(0).stderr;
     assert!(told.contains("left out: 2 scores without a number, of `s`"), "{told}");

@@ -10,7 +10,7 @@ use super::value::{Value, common, guarded, one_of, sum_bits};
 
 /// The value of a scalar function whose arguments have the kinds of its signature; `None` if they do not fit together.
 pub(super) fn scalar(name: &str, args: &[Value], numbers: &[i64]) -> Option<Value> {
-    let Some(first) = args.first() else { return None };
+    let first = args.first()?;
     let text = |expr: Expr| Some(Value::new(expr, Kind::Text));
     let float = |expr: Expr| Some(Value::new(expr, Kind::Float));
     let string = || first.to(Kind::Text).str();
@@ -81,13 +81,12 @@ fn chosen(name: &str, args: &[Value]) -> Option<Value> {
 
 /// Upper and lower case, letter by letter as in DuckDB. A letter that becomes several is refused.
 fn cased(value: &Value, of: fn(char) -> Vec<char>) -> Expr {
-    let one = move |character: char| match of(character).as_slice() {
-        [one] => Ok(*one),
-        _ => {
-            let words =
-                format!("`{character}` becomes several letters in the other case, which engines do differently");
-            Err(Inner::ComputeError(words.into()))
+    let one = move |character: char| {
+        if let [one] = of(character).as_slice() {
+            return Ok(*one);
         }
+        let words = format!("`{character}` becomes several letters in the other case, which engines do differently");
+        Err(Inner::ComputeError(words.into()))
     };
     let all = move |column: Column| -> PolarsResult<Column> {
         let texts = column.str()?.iter();

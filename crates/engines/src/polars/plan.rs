@@ -123,28 +123,26 @@ impl<'s> Planner<'s> {
             Some((OrderByKind::Expressions(keys), None)) => keys,
             Some(_) => return self.unsupported(query.span(), "ORDER BY ALL"),
         };
-        let relation = match query.body.as_ref() {
-            SetExpr::Select(select) => self.select(select, orders)?,
-            _ => {
-                let relation = self.set(&query.body)?;
-                let mut sorted = Vec::new();
-                for key in orders {
-                    let scope = Scope::new(self, relation.columns.clone());
-                    let position =
-                        integer(&key.expr).and_then(|at| relation.columns.get(usize::try_from(at).ok()? - 1));
-                    let column = match (&key.expr, position) {
-                        (_, Some(column)) => Some(column),
-                        (Ast::Identifier(name), _) => match find(&relation.columns, None, &name.value) {
-                            Found::One(column) => Some(column),
-                            _ => None,
-                        },
+        let relation = if let SetExpr::Select(select) = query.body.as_ref() {
+            self.select(select, orders)?
+        } else {
+            let relation = self.set(&query.body)?;
+            let mut sorted = Vec::new();
+            for key in orders {
+                let scope = Scope::new(self, relation.columns.clone());
+                let position = integer(&key.expr).and_then(|at| relation.columns.get(usize::try_from(at).ok()? - 1));
+                let column = match (&key.expr, position) {
+                    (_, Some(column)) => Some(column),
+                    (Ast::Identifier(name), _) => match find(&relation.columns, None, &name.value) {
+                        Found::One(column) => Some(column),
                         _ => None,
-                    };
-                    let Some(column) = column else { return scope.unsupported(&key.expr) };
-                    sorted.push(scope.order(key, &col(column.inner.as_str()))?);
-                }
-                Relation { frame: sort(relation.frame, &sorted), ..relation }
+                    },
+                    _ => None,
+                };
+                let Some(column) = column else { return scope.unsupported(&key.expr) };
+                sorted.push(scope.order(key, &col(column.inner.as_str()))?);
             }
+            Relation { frame: sort(relation.frame, &sorted), ..relation }
         };
         self.limited(relation, query)
     }

@@ -51,7 +51,7 @@ impl Planner<'_> {
         let (extra, keys) = scope.orders(orders, &items, &columns, distinct)?;
         frame = frame.with_columns(&scope.prepared);
         if let Some(sets) = sets {
-            frame = grouped(frame, &scope, &sets)?;
+            frame = grouped(&frame, &scope, &sets)?;
         }
         frame = having.into_iter().fold(frame, LazyFrame::filter);
         for window in &scope.windows {
@@ -308,14 +308,13 @@ impl Scope<'_, '_> {
                 None if distinct => return self.unsupported(&order.expr),
                 None => None,
             };
-            let inner = match selected {
-                Some(inner) => inner,
-                None => {
-                    let value = self.exact(&order.expr)?;
-                    let name = self.planner.fresh();
-                    extra.push(value.expr.alias(name.as_str()));
-                    name
-                }
+            let inner = if let Some(inner) = selected {
+                inner
+            } else {
+                let value = self.exact(&order.expr)?;
+                let name = self.planner.fresh();
+                extra.push(value.expr.alias(name.as_str()));
+                name
             };
             keys.push(self.order(order, &col(inner.as_str()))?);
         }
@@ -369,7 +368,7 @@ fn subsets(parts: &[Vec<Ast>]) -> Vec<Vec<Ast>> {
 }
 
 /// The groups of each grouping set; keys outside the set are null.
-fn grouped(frame: LazyFrame, scope: &Scope<'_, '_>, sets: &[Vec<usize>]) -> Answer<LazyFrame> {
+fn grouped(frame: &LazyFrame, scope: &Scope<'_, '_>, sets: &[Vec<usize>]) -> Answer<LazyFrame> {
     let keys = scope.keys.as_deref().unwrap_or_default();
     // Polars needs an aggregate.
     let aggregates: Vec<Expr> = scope.aggregates.iter().cloned().chain([len().alias("")]).collect();

@@ -40,7 +40,7 @@ pub(super) fn fitting(name: &str, args: &[&Ast], values: &[Value]) -> Option<Vec
 
 fn numbers(signature: &Signature, args: &[&Ast], values: &[Value]) -> Option<Vec<i64>> {
     let count = signature.args.len();
-    if args.len() != count && !(signature.repeats && !args.is_empty()) {
+    if args.len() != count && (args.is_empty() || !signature.repeats) {
         return None;
     }
     let mut numbers = Vec::new();
@@ -132,8 +132,7 @@ impl Scope<'_, '_> {
     /// The argument of an aggregate; rows are counted as a constant.
     fn argument(&mut self, ast: &Ast, name: &str, args: &[&FunctionArgExpr]) -> Answer {
         match args {
-            [FunctionArgExpr::Wildcard] if name == "count" => Ok(Value::int(lit(1_i64), 1)),
-            [] if name == "count" => Ok(Value::int(lit(1_i64), 1)),
+            [FunctionArgExpr::Wildcard] | [] if name == "count" => Ok(Value::int(lit(1_i64), 1)),
             [FunctionArgExpr::Expr(arg)] => {
                 let value = self.value(arg)?;
                 let fits = fitting(name, &[arg], std::slice::from_ref(&value)).is_some() && value.kind != Kind::Null;

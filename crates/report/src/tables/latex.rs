@@ -10,7 +10,7 @@ const PACKAGES: &str = "% Needs in the preamble: \\usepackage{booktabs}, \\usepa
 /// The package for the shaded headings of groups.
 const SHADES: &str = ", \\usepackage[table]{xcolor}";
 
-/// Takes characters and their codes. XeTeX and LuaTeX print the characters; pdfTeX prints the codes, unless the preamble
+/// Takes characters and their codes. `XeTeX` and `LuaTeX` print the characters; pdfTeX prints the codes, unless the preamble
 /// has its own definition and the packages for the script.
 const UNICODE: &str = "\\providecommand{\\mirrorstatstext}[2]{\\ifdefined\\Umathchar#1\\else#2\\fi}\n";
 
@@ -235,7 +235,9 @@ fn is_foreign(c: char) -> bool {
 }
 
 fn push_foreign(latex: &mut String, characters: &str) {
-    let codes: String = characters.chars().map(|c| format!("\\textbackslash{{}}u\\{{{:x}\\}}", u32::from(c))).collect();
+    let codes = characters
+        .chars()
+        .fold(String::new(), |codes, c| codes + &format!("\\textbackslash{{}}u\\{{{:x}\\}}", u32::from(c)));
     latex.extend(["\\mirrorstatstext{", characters, "}{", &codes, "}"]);
 }
 

@@ -68,7 +68,9 @@ fn without_index(
     let is_unnamed = header.first().is_some_and(|name| name.is_empty() || name == "Unnamed: 0");
     if is_unnamed && rows.iter().enumerate().all(is_number) {
         header.remove(0);
-        rows.iter_mut().for_each(|row| drop(row.remove(0)));
+        for row in &mut *rows {
+            row.remove(0);
+        }
     }
     (header, rows)
 }

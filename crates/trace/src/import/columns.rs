@@ -47,7 +47,7 @@ impl Columns {
     /// with a point, which data frames write beside missing values.
     ///
     /// Columns in the names of folders are added; a different value in the row is a fault.
-    pub(super) fn typed(&self, members: Members, folders: &Members, limits: Limits<'_>) -> (Members, Option<Fault>) {
+    pub(super) fn typed(members: Members, folders: &Members, limits: Limits<'_>) -> (Members, Option<Fault>) {
         let mut members = Self::with_types(members, limits);
         let mut fault = None;
         for (key, value) in Self::with_types(folders.clone(), limits) {

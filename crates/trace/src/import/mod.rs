@@ -142,7 +142,7 @@ fn survey(
                 continue;
             }
         };
-        let (members, other) = columns.typed(members, &text.folders, limits);
+        let (members, other) = Columns::typed(members, &text.folders, limits);
         faults.extend(other.map(|fault| fault.at(&line.place)));
         let found = columns.check(&members, &line.place, limits);
         if found.is_empty() {
@@ -186,7 +186,7 @@ fn write(
             let text = &mut texts[step.text];
             let bytes = text.line_at(step.offset)?;
             let members = text.members(&bytes, true).map_err(|_| ImportError::changed(&text.name))?;
-            let members = columns.with_cells(columns.typed(members, &text.folders, limits).0);
+            let members = columns.with_cells(Columns::typed(members, &text.folders, limits).0);
             add(&mut rows, &members).map_err(|()| ImportError::changed(&text.name))?;
         }
         file.end_episode(&mut rows).map_err(failed)?;

@@ -149,7 +149,7 @@ fn mark(timeline: &Timeline) -> Mark {
     let [sight_words, claim_words, decision_words] = [first_sight, claim, decision].map(words);
     let words = format!("first sight {sight_words}, claim {claim_words}, decision {decision_words}");
     let in_view: usize = timeline.visible.iter().map(|run| run.clone().count()).sum();
-    Mark::new(format!("{}: {}; {words}", key.episode_id, counted(*length as u64, "step")))
+    Mark::new(format!("{}: {}; {words}", key.episode_id, counted(*length, "step")))
         .with("experiment", &key.experiment)
         .with("model", &key.model)
         .with("episode", &key.episode_id)

@@ -152,7 +152,7 @@ mod tests {
         const KEY: &str = "sk-Own/0123+456789_abcdef";
         let secret = Secret::new(KEY.to_owned());
         let hex = |byte: u8| if byte.is_multiple_of(2) { format!("{byte:02x}") } else { format!("{byte:02X}") };
-        let percent: String = KEY.bytes().map(|byte| format!("%{}", hex(byte))).collect();
+        let percent = KEY.bytes().fold(String::new(), |text, byte| text + "%" + &hex(byte));
         let plain = [
             KEY.to_owned(),
             KEY.to_uppercase(),

@@ -21,10 +21,6 @@ pub(crate) fn schema_columns() -> Columns {
     columns
 }
 
-pub(crate) fn has_value(name: &str) -> bool {
-    COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
-}
-
 fn type_of(kind: Kind) -> Option<Type> {
     match kind {
         Kind::Bool => Some(Type::Bool),

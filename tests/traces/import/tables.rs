@@ -339,3 +339,16 @@ fn small_tables_of_many_values_are_refused() {
     let told = run(at, &[&["import", "list.parquet", "--from", "lerobot"], &WITH[..]].concat()).refused();
     assert!(told.contains("bytes inflated from a file of its size"), "{told}");
 }
+
+#[test]
+fn whole_numbers_fit_a_declared_column_of_floats() {
+    let folder = folder();
+    let at = folder.path();
+    let line = |t: i32, reward: i32| {
+        format!(r#"{{"episode_id":"e","model":"m","experiment":"x","seed":1,"run":1,"t":{t},"reward":{reward}}}"#)
+    };
+    fs::write(at.join("rows.jsonl"), format!("{}\n{}\n", line(1, 0), line(2, 7))).unwrap();
+    run(at, &[&["import", "rows.jsonl"], &WITH[..]].concat()).done();
+    let found = run(at, &["score", "x.parquet", "--metrics", "OVER"]).done();
+    assert!(found.contains("e,m,x,1,1,1"), "{found}");
+}

@@ -174,9 +174,10 @@ fn write(
     let failed = |error: ParquetError| TraceError::write(out, error);
     let known = columns.known().map(|column| (field(column), Some(column.stored.kind())));
     let own = columns.own().into_iter().map(|own| {
-        // A column of nulls is compatible with any type in other files, unless the definitions declare its own.
-        let declared = || limits.expected.declared.iter().find(|declared| declared.name == own.name);
-        let kind = own.kind.or_else(|| Some(declared()?.kind));
+        // The declared type holds whole numbers of a float column, and columns of nulls. A column of nulls without it is
+        // compatible with any type in other files.
+        let declared = limits.expected.declared.iter().find(|declared| declared.name == own.name);
+        let kind = declared.map(|declared| declared.kind).or(own.kind);
         (Field::new(&own.name, kind.map_or(DataType::Null, Kind::data_type), true), kind)
     });
     let mut rows = Gathered::new(known.chain(own));

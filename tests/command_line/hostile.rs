@@ -115,7 +115,7 @@ const SHOWN: [&str; 28] = [
     "gate a.parquet b.parquet --format github",
     "gate a.parquet b.parquet --format junit",
     "import a.parquet -o c.parquet",
-    "score a.parquet",
+    "score a.parquet -o scores.csv",
     "query SELECT+model+FROM+episodes a.parquet --format table",
     "trace info a.parquet",
     "trace info a.parquet --episodes",

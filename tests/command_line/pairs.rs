@@ -57,7 +57,7 @@ const EPISODE: Walk = Walk {
         ("trace check a.parquet --max-unreadable 0.05", Answer),
         ("trace seal a.parquet sealed.parquet", Answer),
         ("score a.parquet -o scores.csv", Answer),
-        ("definitions sensitivity a.parquet", Answer),
+        ("definitions sensitivity a.parquet", Invalid),
         ("view a.parquet --export page", Limit("steps times columns of an episode")),
         ("score a.parquet --definitions some.toml -o s.csv", Limit("bytes of values of the definitions")),
         ("score a.parquet --definitions many.toml -o s.csv", Limit("rows times values of the definitions")),
@@ -121,7 +121,7 @@ const EPISODES: Walk = Walk {
         ("score a.parquet --definitions sums.toml -o s.csv", Limit("values of the definitions")),
         ("report a.parquet -o report", Answer),
         ("table verify report", Answer),
-        ("table rescore report --definitions extended --out again", Answer),
+        ("table rescore report --definitions paper --out again", Answer),
         ("report a.parquet --by episode_id -o other", Limit("cells, groups times metrics")),
         ("figure intervals a.parquet -o figure.svg", Answer),
         ("diff paper extended a.parquet", Answer),
@@ -257,13 +257,15 @@ const WALKS: [&Walk; 9] =
     [&EPISODE, &TEXTS, &TOO_MANY_EPISODES, &EPISODES, &MODELS, &COLORS, &LABELS, &STUDIES, &FILES];
 
 fn is_there(words: &str) -> bool {
-    match words.split_whitespace().next() {
-        Some("view") => cfg!(feature = "view"),
-        Some("record" | "world") => cfg!(feature = "sim"),
-        Some("participants") => cfg!(all(feature = "sim", feature = "view")),
-        Some("query") => cfg!(feature = "polars"),
-        _ => true,
-    }
+    let built = [
+        ("view", cfg!(feature = "view")),
+        ("record", cfg!(feature = "sim")),
+        ("world", cfg!(feature = "sim")),
+        ("participants", cfg!(all(feature = "sim", feature = "view"))),
+        ("query", cfg!(feature = "polars")),
+    ];
+    let verb = words.split_whitespace().next();
+    built.iter().find(|(name, _)| Some(*name) == verb).is_none_or(|(_, is_built)| *is_built)
 }
 
 fn walk(walk: &Walk) {

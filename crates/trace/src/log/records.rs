@@ -133,6 +133,7 @@ impl<R: Read + Seek> Records<R> {
     }
 
     /// The records of the index; none if its checksum differs, since a reader trusts its positions.
+    #[cfg(feature = "view")]
     pub(super) fn verified_summary(&mut self) -> io::Result<Vec<Record<'static>>> {
         let Some((last, footer)) = self.footer()? else { return Ok(Vec::new()) };
         let counted = usize::try_from(last - footer.summary_start).unwrap_or(LONGEST) + FOOTER - 4;

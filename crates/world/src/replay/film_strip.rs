@@ -124,13 +124,21 @@ impl Strip {
 
     fn in_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
         let set = TraceSet::open(traces).map_err(ReplayError::other)?;
+        let mut undrawable = None;
         for (input, file) in traces.iter().zip(set.files()) {
+            // All rows are read at once, so a file that cannot be drawn is not read.
+            let recipe = match Recipe::of(&file.recording()) {
+                Ok(recipe) => recipe,
+                Err(error) => {
+                    undrawable.get_or_insert(error);
+                    continue;
+                }
+            };
             let rows = merge::read(&input.path).map_err(ReplayError::other)?;
             let Some(found) = rows.iter().find(|rows| rows.episode_id == self.episode) else { continue };
-            let recipe = Recipe::of(&file.recording())?;
             return self.rendered(&recipe, found.episode().map_err(ReplayError::other)?).map(Some);
         }
-        Ok(None)
+        undrawable.map_or(Ok(None), Err)
     }
 
     fn rendered(&self, recipe: &Recipe, episode: Episode) -> Result<Reel, ReplayError> {

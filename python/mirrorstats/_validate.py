@@ -11,12 +11,13 @@ from ._error import ArgumentError, check_number
 from ._paths import Definitions, Spool, several, text, toml_file
 
 
-def validate(inputs: Any, *, definitions: Definitions = "paper", threads: Optional[int] = None) -> Validation:
+def validate(inputs: Any, *, definitions: Optional[Definitions] = None, threads: Optional[int] = None) -> Validation:
     """Checks traces against every rule of the schema, as `mirrorstats trace validate --json`.
 
     Args:
         inputs: files, folders or globs, one or several.
         definitions: the definitions whose experiments are known: `paper`, `extended`, a TOML file, TOML text or a dict.
+            If None, those that the traces carry, else `paper`.
         threads: how many threads to use; all cores if None.
 
     Returns:
@@ -39,4 +40,5 @@ def validate(inputs: Any, *, definitions: Definitions = "paper", threads: Option
         if not isinstance(one, (str, bytes, os.PathLike)) and not hasattr(one, "fs"):
             raise TypeError(f"inputs: expected a path, found {type(one).__name__}; `import_steps` checks a data frame")
     paths = [text(one, spool) for one in given]
-    return Validation(_native.validate(paths, toml_file(definitions, "definitions", spool), threads))
+    named = None if definitions is None else toml_file(definitions, "definitions", spool)
+    return Validation(_native.validate(paths, named, threads))

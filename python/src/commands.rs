@@ -28,13 +28,13 @@ pub fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 pub fn validate(
     py: Python<'_>,
     paths: Vec<OsString>,
-    definitions: PathBuf,
+    definitions: Option<PathBuf>,
     threads: Option<NonZeroUsize>,
 ) -> PyResult<Answer> {
     let found = py.detach(|| {
         let inputs = inputs::resolve(&paths, std::io::empty()).map_err(error::of_input)?;
         let threads = threads.or_else(|| available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
-        study::findings(&definitions, &inputs, threads).map_err(error::of_study)
+        study::findings(definitions.as_deref(), &inputs, threads).map_err(error::of_study)
     })?;
     answer::of(&found, study::findings_text(&found))
 }

@@ -296,7 +296,9 @@ fn a_trace_carries_the_definitions_that_it_was_imported_with() {
     write_rows(&at.join("in.parquet"), &[table(reward)], None);
     run(at, &["import", "in.parquet", "-o", "x.parquet", "--definitions", "study.toml"]).done();
     let expected = run(at, &["score", "x.parquet", "--definitions", "study.toml"]).done();
+    let valid = run(at, &["trace", "validate", "x.parquet", "--definitions", "study.toml"]).done();
     fs::remove_file(at.join("arms.toml")).unwrap();
+    assert_eq!(run(at, &["trace", "validate", "x.parquet"]).done(), valid);
     let answer = run(at, &["score", "x.parquet"]).ends(0);
     assert_eq!(answer.stdout, expected);
     let note = "note: the definitions `study` are those that the traces carry; --definitions names others\n";

@@ -102,8 +102,8 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
     };
     let too_narrow = |least| FigureError::TooNarrow { figure: name, least };
     let printed = input.width.map(|width| width.printed(sheet.width()).map_err(too_narrow)).transpose()?;
-    let title = input.title.unwrap_or_else(|| name.title());
-    let mut figure = Figure::new(sheet, height, title, shown::caption(name, &metrics, input.sheets));
+    let title = input.title.map_or_else(|| shown::title(name, &metrics, matrix.catalog()), str::to_owned);
+    let mut figure = Figure::new(sheet, height, &title, shown::caption(name, &metrics, input.sheets));
     figure.models = matrix.models.len();
     figure.printed = printed;
     Ok(figure)

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use super::FigureError;
 use super::matrix::{Matrix, MetricId};
 use exact::suggest::hint;
-use metric::catalog::{Kind, Measures};
+use metric::catalog::{Catalog, Kind, Measures};
 use metric::relations::Relations;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -188,6 +188,19 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
             related(|found| found.durations.first().map(|(one, other)| [one, other].map(String::clone)))
         }
         FigureName::E5Outcomes | FigureName::Gaze => None,
+    }
+}
+
+/// The title over these metrics. Definitions of other domains have no task and no self to name: their metrics do.
+pub(super) fn title(figure: FigureName, metrics: &[MetricId<'_>], catalog: &Catalog) -> String {
+    let name = |at: usize| metrics.get(at).map_or("", |id| id.name);
+    match figure {
+        _ if catalog.domain.is_none() => figure.title().to_owned(),
+        FigureName::Scatter => format!("{} against {}", name(1), name(0)),
+        FigureName::Intervals => format!("{} with 95 % intervals", name(0)),
+        FigureName::Slopes => format!("{} from experiment to experiment", name(0)),
+        FigureName::DoseResponse => format!("{} against the dose", name(0)),
+        _ => figure.title().to_owned(),
     }
 }
 

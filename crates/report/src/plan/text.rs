@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Given, Plan, PlanRequest, PlannedTest};
 use crate::tables::{Table, push_wrapped};
-use exact::format::{UNDEFINED, fixed};
+use exact::format::{UNDEFINED, counted, fixed};
 use statistics::sample_size::{Clusters, Rates, SEED, STUDIES};
 
 impl Plan {
@@ -62,8 +62,9 @@ pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
     let at_most = if request.sequential { "at most " } else { "" };
     match (request.given, test.runs, test.difference) {
         (Given::Difference(difference), Some(runs), _) => format!(
-            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} {cluster}s) show a difference of {difference} with power {power}, {by}{family}",
-            seeds * runs
+            "{at_most}{} per model and experiment ({runs} for each of {}) show a difference of {difference} with power {power}, {by}{family}",
+            counted(seeds * runs, "episode"),
+            counted(seeds, cluster)
         ),
         (Given::Difference(difference), None, _) => format!(
             "no number of runs up to {} episodes shows a difference of {difference} with power {power}, {by}{family}{}",
@@ -75,13 +76,15 @@ pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
             }
         ),
         (Given::Runs(runs), _, Some(difference)) => format!(
-            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} {cluster}s) show a difference of {} or more with power {power}, {by}{family}",
-            seeds * runs,
+            "{at_most}{} per model and experiment ({runs} for each of {}) show a difference of {} or more with power {power}, {by}{family}",
+            counted(seeds * runs, "episode"),
+            counted(seeds, cluster),
             fixed(Some(difference), 3)
         ),
         (Given::Runs(runs), _, None) => format!(
-            "{at_most}{} episodes per model and experiment ({runs} for each of {seeds} {cluster}s) show no difference with power {power}, {by}{family}",
-            seeds * runs
+            "{at_most}{} per model and experiment ({runs} for each of {}) show no difference with power {power}, {by}{family}",
+            counted(seeds * runs, "episode"),
+            counted(seeds, cluster)
         ),
     }
 }
@@ -104,8 +107,9 @@ pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
     let clusters = if request.clusters.are_units() {
         let design = if people { "in a crossed study" } else { "where seeds are declared clusters" };
         format!(
-            "{cluster}s: intraclass correlation {icc}, so that tests count the {seeds} {cluster}s, as `stats` does {design}; \
+            "{cluster}s: intraclass correlation {icc}, so that tests count the {}, as `stats` does {design}; \
              an episode has the outcome of its {cluster} with probability {}, and one of its own otherwise",
+            counted(seeds, cluster),
             fixed(Some(icc.sqrt()), 3)
         )
     } else {

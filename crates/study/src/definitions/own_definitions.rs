@@ -46,6 +46,10 @@ impl Carried {
         Self { name: definitions.catalog.name.clone(), text: definitions.as_one_file() }
     }
 
+    pub(crate) fn load(&self, columns: &Columns) -> Result<Definitions, StudyError> {
+        Ok(Definitions::from_toml(&self.name, &self.text, columns)?)
+    }
+
     fn of_file(file: &TraceFile) -> Option<Self> {
         // Most recordings carry none, and are long.
         let has = |text: &str| text.contains("\"definitions\":{\"name\"");
@@ -55,7 +59,7 @@ impl Carried {
 }
 
 /// The definitions that these traces carry; `None` if no trace carries any.
-fn carried(traces: &TraceSet) -> Result<Option<Carried>, StudyError> {
+pub(crate) fn carried(traces: &TraceSet) -> Result<Option<Carried>, StudyError> {
     let mut found: Option<(&TraceFile, Carried)> = None;
     for file in traces.files() {
         match (Carried::of_file(file), &found) {
@@ -169,10 +173,10 @@ impl Question {
             let whole = side_by_side(&self.parts, columns)?;
             return whole.ok_or_else(|| StudyError::DefinitionsDiffer { groups: self.parts.clone() });
         }
-        Ok(match &self.carried {
-            Some(Carried { name, text }) => Definitions::from_toml(name, text, columns)?,
-            None => Definitions::load(self.definitions_name(), columns)?,
-        })
+        match &self.carried {
+            Some(carried) => carried.load(columns),
+            None => Ok(Definitions::load(self.definitions_name(), columns)?),
+        }
     }
 }
 

@@ -118,7 +118,7 @@ impl Drawings {
     pub(crate) fn on_page<'a>(&'a self, svgs: &'a [String]) -> Vec<html::EmbeddedFigure<'a>> {
         let figure = |((name, drawn), svg): (&'a (FigureName, Figure), &'a String)| html::EmbeddedFigure {
             name: name.name(),
-            title: name.title(),
+            title: drawn.title(),
             caption: drawn.caption(),
             svg,
         };

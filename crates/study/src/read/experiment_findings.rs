@@ -1,27 +1,19 @@
 //! Compares experiments in traces with those in the definitions. The definitions take precedence, and differences are
 //! reported. Files must agree on experiments that the definitions do not know.
 
-use std::path::Path;
-
-use crate::error::StudyError;
 use exact::escape::visible;
 use metric::catalog::{Catalog, Experiment};
-use metric::definitions::Definitions;
 use score::declared_experiments::{DeclarationError, faults, listed, spelled};
-use score::vocabulary::schema_columns;
 use trace::declared_experiment::DeclaredExperiment;
 use trace::diagnostic::{Code, Finding};
-use trace::inputs::Input;
 use trace::open::{TraceFile, TraceSet};
 
 /// A note for each title, order or level in a footer that differs from the definitions, or whose metric they lack. An
-/// error for each experiment that only footers know, if they disagree. Skips files that cannot be opened.
-pub(crate) fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
-    let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
-    let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());
-    let mut found: Vec<Finding> = traces.files().iter().flat_map(|file| notes(file, &catalog)).collect();
-    found.extend(faults(&catalog, &traces).into_iter().map(finding));
-    Ok(found)
+/// error for each experiment that only footers know, if they disagree.
+pub(crate) fn experiment_findings(catalog: &Catalog, traces: &TraceSet) -> Vec<Finding> {
+    let mut found: Vec<Finding> = traces.files().iter().flat_map(|file| notes(file, catalog)).collect();
+    found.extend(faults(catalog, traces).into_iter().map(finding));
+    found
 }
 
 fn finding(error: DeclarationError) -> Finding {
@@ -81,8 +73,9 @@ fn differences(declared: &DeclaredExperiment, known: &Experiment) -> Vec<(String
 
 #[cfg(test)]
 mod tests {
-    use super::{DeclaredExperiment, differences, schema_columns};
+    use super::{DeclaredExperiment, differences};
     use metric::definitions::Definitions;
+    use score::vocabulary::schema_columns;
 
     #[test]
     fn differing_declarations_are_reported_and_missing_ones_are_not() {

@@ -4,9 +4,9 @@ use std::fmt::{self, Write as _};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use crate::StudyError;
 use crate::experiment_findings::experiment_findings;
-use crate::own_definitions::Carried;
+use crate::own_definitions::{Carried, carried};
+use crate::{DEFAULT_DEFINITIONS, StudyError};
 use exact::escape::visible;
 use exact::format::counted;
 use metric::definitions::Definitions;
@@ -15,6 +15,7 @@ use score::vocabulary::{declared_columns, schema_columns};
 use trace::checksums::Checksums;
 use trace::diagnostic::Severity;
 use trace::inputs::Input;
+use trace::open::{TraceFile, TraceSet};
 use trace::schema::{DeclaredColumn, Domain};
 use trace::validate::{Expected, Validation, validate_as};
 
@@ -34,10 +35,14 @@ impl ExpectedTraces {
         let definitions = Definitions::load(name, &schema_columns())?;
         let is_built_in = name.to_str().is_some_and(|name| file::built_in(name).is_some());
         let carried = (!is_built_in).then(|| Carried::of(&definitions));
-        let declared = declared_columns(&definitions);
-        let catalog = definitions.catalog;
+        Ok(Self { carried, ..Self::by(&definitions) })
+    }
+
+    fn by(definitions: &Definitions) -> Self {
+        let catalog = &definitions.catalog;
         let experiments = (!catalog.open).then(|| catalog.experiment.keys().cloned().collect());
-        Ok(Self { experiments, domain: catalog.domain, declared, carried })
+        let (domain, declared) = (catalog.domain.clone(), declared_columns(definitions));
+        Self { experiments, domain, declared, carried: None }
     }
 
     pub(crate) fn as_expected(&self) -> Expected<'_> {
@@ -48,10 +53,20 @@ impl ExpectedTraces {
 
 const SHOWN: usize = 10;
 
-pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> Result<Validation, StudyError> {
-    let expected = ExpectedTraces::of(definitions)?;
-    let mut found = validate_as(inputs, expected.as_expected(), threads)?;
-    found.findings.extend(experiment_findings(definitions, inputs)?);
+/// The findings under these definitions. If `None`: under those that the traces carry, else those of the paper.
+pub fn findings(
+    definitions: Option<&Path>,
+    inputs: &[Input],
+    threads: NonZeroUsize,
+) -> Result<Validation, StudyError> {
+    let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());
+    let named = definitions.map_or(Path::new(DEFAULT_DEFINITIONS), |name| name);
+    let definitions = match definitions.map_or_else(|| carried(&traces), |_| Ok(None))? {
+        Some(carried) => carried.load(&schema_columns())?,
+        None => Definitions::load(named, &schema_columns())?,
+    };
+    let mut found = validate_as(inputs, ExpectedTraces::by(&definitions).as_expected(), threads)?;
+    found.findings.extend(experiment_findings(&definitions.catalog, &traces));
     Ok(found)
 }
 

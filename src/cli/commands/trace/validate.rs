@@ -18,9 +18,10 @@ use trace::open::TraceFile;
 pub struct ValidateCommand {
     #[command(flatten)]
     input: TraceArgs,
-    /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
-    definitions: PathBuf,
+    /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file [default: those that the traces
+    /// carry, else `paper`]
+    #[arg(long, value_name = "NAME|FILE")]
+    definitions: Option<PathBuf>,
     /// Print all findings as JSON
     #[arg(long)]
     json: bool,
@@ -29,7 +30,7 @@ pub struct ValidateCommand {
 impl ValidateCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
-        let report = findings(&self.definitions, &inputs, self.input.threads.count())?;
+        let report = findings(self.definitions.as_deref(), &inputs, self.input.threads.count())?;
         let files: Vec<_> = inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect();
         output::notes(&by_others(&files));
         output::print_rendered(&report, self.json, findings_text)?;

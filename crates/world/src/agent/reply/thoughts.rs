@@ -14,7 +14,7 @@ const NEVER: &str = r"[^\s\S]";
 
 /// Each kind of thoughts: the opening mark; the closing mark, which counts without an opening one too; the mark that
 /// closes opened thoughts if there is no other. Closing marks include the header of the answer.
-const MARKS: [[&str; 3]; 7] = [
+const MARKS: [[&str; 3]; 8] = [
     // Qwen, DeepSeek, EXAONE, Seed and others; tags may have a prefix (`seed:think`) and attributes.
     [
         r"<(?:[\w-]+:)?(?:think|thinking|thoughts?|reasoning|reflection|scratchpad)(?:\s[^<>]*)?>",
@@ -41,6 +41,8 @@ const MARKS: [[&str; 3]; 7] = [
     ],
     // MedGemma.
     ["<unused94>", "<unused95>", NEVER],
+    // A fenced block of thoughts ends with the first fence: the answer may have a fence of its own.
+    [r"```\s*(?:think|thinking|thoughts?|reasoning|analysis|reflection|scratchpad)\b", NEVER, r"^[\s\S]*?```"],
 ];
 
 /// The mark of the answer's end in the formats that mark its beginning.
@@ -144,6 +146,10 @@ mod tests {
             ("{\"a\": \"<think>\"}", Thoughts::None),
             ("<think>hm</think>{\"a\": \"<think>\"}", Thoughts::Before("{\"a\": \"<think>\"}")),
             ("{} <|end|>", Thoughts::None),
+            ("```thinking\n{1}\n```\n{}", Thoughts::Before("{}")),
+            ("```thinking\n{1}\n```\n```json\n{}\n```\nDone.", Thoughts::Before("```json\n{}\n```\nDone.")),
+            ("``` reasoning\n{1}\n", Thoughts::Open),
+            ("```json\n{\"a\": \"```thinking\"}\n```", Thoughts::None),
             ("<think>a [THINK] {1}</think>{}", Thoughts::Before("{}")),
             ("<think>a</think>[THINK]{1}[/THINK]{}", Thoughts::Before("{}")),
             ("<|channel|>analysis<|message|>{1}<|end|>{}<|end|>", Thoughts::Before("{}")),

@@ -54,6 +54,10 @@ impl Figure {
     }
 
     /// One or two sentences on how to read it.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+
     pub fn caption(&self) -> &str {
         &self.caption
     }

@@ -16,6 +16,8 @@ pub enum Kind {
     Real,
     Float,
     Text,
+    /// A date, a list or another type that queries do not read.
+    Other,
 }
 
 impl Kind {
@@ -32,7 +34,7 @@ impl Kind {
     }
 
     /// The kind of a column, and the bits of its largest integer.
-    pub(super) fn of(ty: &DataType) -> Option<(Self, u32)> {
+    pub(super) fn of(ty: &DataType) -> (Self, u32) {
         let stored = match ty {
             DataType::Boolean => Stored::Bool,
             DataType::Int8 => Stored::Int8,
@@ -41,10 +43,10 @@ impl Kind {
             DataType::Float32 => Stored::Float32,
             DataType::Float64 => Stored::Float64,
             DataType::String => Stored::String,
-            DataType::Null => return Some((Self::Null, 0)),
-            _ => return None,
+            DataType::Null => return (Self::Null, 0),
+            _ => return (Self::Other, 0),
         };
-        Some(Self::stored(stored))
+        Self::stored(stored)
     }
 
     pub(super) fn wide(self) -> DataType {
@@ -55,6 +57,7 @@ impl Kind {
             Self::Real => DataType::Float32,
             Self::Decimal | Self::Float => DataType::Float64,
             Self::Text => DataType::String,
+            Self::Other => DataType::Binary,
         }
     }
 
@@ -67,6 +70,7 @@ impl Kind {
             Self::Real => "FLOAT",
             Self::Float => "DOUBLE",
             Self::Text => "VARCHAR",
+            Self::Other => "another type",
         }
     }
 

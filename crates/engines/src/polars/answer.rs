@@ -45,10 +45,10 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
     let mut relations = BTreeMap::new();
     for (table, mut frame) in tables {
         let schema = frame.collect_schema().map_err(PolarsError::from)?;
-        let columns = schema.iter().filter_map(|(name, ty)| {
-            let (kind, bits) = Kind::of(ty)?;
+        let columns = schema.iter().map(|(name, ty)| {
+            let (kind, bits) = Kind::of(ty);
             let (name, inner) = (name.to_string(), name.to_string());
-            Some(relation::Column { table: table.name().to_owned(), name, inner, kind, bits, hidden: false })
+            relation::Column { table: table.name().to_owned(), name, inner, kind, bits, hidden: false }
         });
         let columns = columns.collect();
         relations.insert(table, Relation { frame, columns });

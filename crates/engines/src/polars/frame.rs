@@ -3,11 +3,11 @@
 use std::fs;
 
 use polars::prelude::{
-    DataType, Expr, HiveOptions, LazyFrame, NULL, NamedFrom, PlRefPath, ScanArgsParquet, ScanSources, Series,
+    AnyValue, DataType, Expr, HiveOptions, LazyFrame, NULL, NamedFrom, PlRefPath, ScanArgsParquet, ScanSources, Series,
     UnionArgs, col, concat, lit, when,
 };
 
-use super::run::PolarsError;
+use super::run::{PolarsError, collect};
 use score::error::ScoreError;
 use trace::labels::Labels;
 use trace::open::{TraceFile, TraceSet};
@@ -17,31 +17,28 @@ use trace::verify::verify_pages;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameColumn {
     pub name: String,
-    pub stored: Stored,
+    /// `None` for a type that queries do not read: its values are not loaded.
+    pub stored: Option<Stored>,
 }
 
 impl FrameColumn {
-    pub fn wide(name: &str, kind: Kind) -> Option<Self> {
-        let stored = match kind {
-            Kind::Bool => Stored::Bool,
-            Kind::Int => Stored::Int64,
-            Kind::Float => Stored::Float64,
-            Kind::String => Stored::String,
-            Kind::Unsupported => return None,
+    /// A column of the schema's type; for an unknown column, the widest type of its kind in the files.
+    pub fn natural(traces: &TraceSet, name: &str, kind: Kind) -> Self {
+        let is_single = || traces.files().iter().filter_map(|file| file.column(name)).all(|column| column.is_single);
+        let stored = match (traces.schema_column(name), kind) {
+            (Some(known), _) => Some(known.stored),
+            (None, Kind::Bool) => Some(Stored::Bool),
+            (None, Kind::Int) => Some(Stored::Int64),
+            (None, Kind::Float) => Some(if is_single() { Stored::Float32 } else { Stored::Float64 }),
+            (None, Kind::String) => Some(Stored::String),
+            (None, Kind::Unsupported) => None,
         };
-        Some(Self { name: name.to_owned(), stored })
-    }
-
-    /// A column of the schema's type; for an unknown column, the widest type of its kind.
-    pub fn natural(traces: &TraceSet, name: &str, kind: Kind) -> Option<Self> {
-        match traces.schema_column(name) {
-            Some(known) => Some(Self { name: name.to_owned(), stored: known.stored }),
-            None => Self::wide(name, kind),
-        }
+        Self { name: name.to_owned(), stored }
     }
 
     fn data_type(&self) -> DataType {
-        match self.stored {
+        let Some(stored) = self.stored else { return DataType::Binary };
+        match stored {
             Stored::Bool => DataType::Boolean,
             Stored::Int8 => DataType::Int8,
             Stored::Int32 => DataType::Int32,
@@ -53,8 +50,12 @@ impl FrameColumn {
     }
 
     fn of(&self, file: &TraceFile) -> Expr {
-        let present = file.column(&self.name).is_some_and(|column| column.kind.is_some());
-        let values = if present { col(self.name.as_str()) } else { lit(NULL) };
+        let is_read = self.stored.is_some() && file.column(&self.name).is_some_and(|column| column.kind.is_some());
+        let values = match file.folder(&self.name).map(|folder| folder.value()) {
+            Some(value) => value.map_or(lit(NULL), lit),
+            None if is_read => col(self.name.as_str()),
+            None => lit(NULL),
+        };
         values.strict_cast(self.data_type()).alias(self.name.as_str())
     }
 }
@@ -65,13 +66,7 @@ pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, Po
     verify_pages(traces).map_err(ScoreError::from)?;
     let (labels, read): (Vec<&FrameColumn>, Vec<&FrameColumn>) =
         columns.iter().partition(|column| traces.is_label_column(&column.name));
-    for file in traces.files() {
-        if let Some(column) = read.iter().find(|column| file.folder(&column.name).is_some()) {
-            let expected = format!("{}: expected the column `{}` in the file", file.name(), column.name);
-            let help = "use --engine native, or `mirrorstats import` the files first";
-            return Err(PolarsError::Failed(format!("{expected}, found it in the name of a folder\n  help: {help}")));
-        }
-    }
+    traces.files().iter().try_for_each(check_folders)?;
     let frames = traces.files().iter().map(|file| scan(file, &read)).collect::<Result<Vec<_>, _>>()?;
     let frame = concat(frames, UnionArgs { rechunk: false, ..UnionArgs::default() })?;
     let labels: Vec<Expr> = labels.into_iter().map(|column| label(traces.labels(), &column.name)).collect();
@@ -87,18 +82,35 @@ fn label(labels: &Labels, name: &str) -> Expr {
     when(ids(true)).then(lit(true)).when(ids(false)).then(lit(false)).otherwise(lit(NULL)).alias(name)
 }
 
+/// Refuses a column of the file whose values differ from the name of a folder.
+fn check_folders(file: &TraceFile) -> Result<(), PolarsError> {
+    for folder in file.folders().iter().filter(|folder| file.folder(&folder.column.name).is_none()) {
+        let (name, Some(value)) = (folder.column.name.as_str(), folder.value()) else { continue };
+        let other = col(name).cast(DataType::String).neq(lit(value)).any(true);
+        let found = collect(whole(file)?.select([other]))?;
+        if found.columns()[0].get(0)? == AnyValue::Boolean(true) {
+            let expected = format!("{}: expected `{value}` in the column `{name}`, as in its folder", file.name());
+            return Err(PolarsError::Failed(format!("{expected}; move the file, or correct the column")));
+        }
+    }
+    Ok(())
+}
+
 fn scan(file: &TraceFile, columns: &[&FrameColumn]) -> Result<LazyFrame, PolarsError> {
+    Ok(whole(file)?.select(columns.iter().map(|column| column.of(file)).collect::<Vec<_>>()))
+}
+
+fn whole(file: &TraceFile) -> Result<LazyFrame, PolarsError> {
     let gone = |source| PolarsError::Unreadable { file: file.name().to_owned(), source };
     // An absolute path cannot be mistaken for a network address.
     let path = fs::canonicalize(file.path()).map_err(gone)?;
-    let options = ScanArgsParquet { glob: false, cache: false, ..ScanArgsParquet::default() };
-    let frame = if path.to_str().is_some() {
+    let hive_options = HiveOptions::new_disabled();
+    let options = ScanArgsParquet { glob: false, cache: false, hive_options, ..ScanArgsParquet::default() };
+    Ok(if path.to_str().is_some() {
         LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?
     } else {
         // Polars takes paths as text; a path that is not valid text is opened here.
         let opened = file.reader().map_err(gone)?;
-        let options = ScanArgsParquet { hive_options: HiveOptions::new_disabled(), ..options };
         LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?
-    };
-    Ok(frame.select(columns.iter().map(|column| column.of(file)).collect::<Vec<_>>()))
+    })
 }

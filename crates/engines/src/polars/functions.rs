@@ -116,6 +116,8 @@ pub(super) fn aggregate(name: &str, of: &Value) -> Option<Aggregate> {
             value: total(of.kind)?,
             bits: sum_bits(of.bits),
         }),
+        "avg" | "mean" if of.kind == Kind::Real => Some(float(of.float().mean())),
+        "stddev" | "stddev_samp" if of.kind == Kind::Real => Some(float(of.float().std(1))),
         _ if !of.kind.is_number() => None,
         "avg" | "mean" => Some(float(of.float().mean())),
         "median" => Some(float(of.float().median())),
@@ -162,7 +164,7 @@ fn extreme(name: &str, of: &Value, least: Expr, greatest: Expr, nan: Expr) -> Op
             made(vec![part], |parts, _| Value { expr: parts[0].clone(), kind: Kind::Decimal, bits: 1 })
         }
         (Kind::Real, _) => made(vec![part], |parts, _| Value::new(parts[0].clone(), Kind::Real)),
-        (Kind::Null, _) => return None,
+        (Kind::Null | Kind::Other, _) => return None,
     })
 }
 

@@ -20,6 +20,9 @@ use exact::suggest::nearest;
 use metric::syntax::grammar::shortened;
 use toml_spec::Source;
 
+/// What a column of another type is.
+pub(super) const OTHER: &str = "neither true or false, a number nor a text";
+
 /// Polars plans by recursion.
 const DEEPEST: usize = 100;
 
@@ -229,6 +232,9 @@ impl<'p, 's> Scope<'p, 's> {
 
     /// Refuses the column of a row where groups are meant.
     fn ungrouped(&self, name: &Ident, value: Value) -> Answer {
+        if value.kind == Kind::Other {
+            return Err(unsupported(self.source(), name.span, format!("`{}`, which is {OTHER}", name.value)));
+        }
         match &self.keys {
             Some(keys) if self.rows_of.is_none() => {
                 let (name, span) = (&name.value, name.span);

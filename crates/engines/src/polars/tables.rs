@@ -23,7 +23,7 @@ pub fn steps(traces: &TraceSet, declared: &[DeclaredColumn]) -> Result<LazyFrame
             return Err(PolarsError::Failed(format!("{problem}; write it with one type in all traces")));
         }
         let kind = kind_in(traces, declared, name).unwrap_or(found.kind);
-        columns.extend(FrameColumn::natural(traces, name, kind));
+        columns.push(FrameColumn::natural(traces, name, kind));
     }
     frame::steps(traces, &columns)
 }

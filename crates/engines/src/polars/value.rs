@@ -126,7 +126,12 @@ fn remainder(left: &Value, right: &Value) -> Expr {
 
 /// `left op right` of one kind; `None` for kinds that do not fit.
 pub(super) fn compare(left: &Value, op: &BinaryOperator, right: &Value) -> Option<Value> {
-    let kind = common([left, right]).filter(|_| left.is_exact_beside(right) && right.is_exact_beside(left))?;
+    let wide = || {
+        let is_real = [left, right].iter().any(|value| value.kind == Kind::Real);
+        (is_real && left.widens() && right.widens()).then_some(Kind::Float)
+    };
+    let exact = common([left, right]).filter(|_| left.is_exact_beside(right) && right.is_exact_beside(left));
+    let kind = exact.or_else(wide)?;
     let (a, b) = (left.to(kind), right.to(kind));
     Some(Value::bool(match op {
         BinaryOperator::Eq => a.eq(b),
@@ -142,6 +147,17 @@ impl Value {
     /// DuckDB stops at a remainder by zero.
     fn is_positive_literal(&self) -> bool {
         matches!(self.expr, Expr::Literal(_)) && self.kind == Kind::Int && self.bits > 0
+    }
+
+    /// True for floats, and for literals that 32 bits hold: beside a FLOAT, 64 bits give the answer of DuckDB's 32.
+    fn widens(&self) -> bool {
+        let is_literal = matches!(self.expr, Expr::Literal(_));
+        match self.kind {
+            Kind::Real | Kind::Float => true,
+            Kind::Int => is_literal && self.bits <= 24,
+            Kind::Decimal => is_literal && self.bits == 0,
+            _ => false,
+        }
     }
 
     /// A decimal beside a float is a float in DuckDB too; a literal beside an integer is compared exactly.

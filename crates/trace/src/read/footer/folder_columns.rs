@@ -39,12 +39,16 @@ pub(crate) fn folder_columns(file: &str, path: &Path) -> Result<Vec<FolderColumn
                 return Err(Box::new(Finding::new(Code::WrongType, file, kind.name(), found).in_column(&name)));
             }
         }
-        Ok(FolderColumn { column: FileColumn { name, kind: value.as_ref().map(|_| kind) }, value })
+        Ok(FolderColumn { column: FileColumn { name, kind: value.as_ref().map(|_| kind), is_single: false }, value })
     };
     folder_values(path).into_iter().map(column).collect()
 }
 
 impl FolderColumn {
+    pub fn value(&self) -> Option<&str> {
+        self.value.as_deref()
+    }
+
     /// The value in each of these rows.
     pub(crate) fn repeated(&self, held: &DataType, rows: usize) -> Result<ArrayRef, ArrowError> {
         let Some(value) = &self.value else { return Ok(new_null_array(held, rows)) };

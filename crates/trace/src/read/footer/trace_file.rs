@@ -65,6 +65,8 @@ pub struct FileColumn {
     pub name: String,
     /// Its logical type; `None` for a column declared as all null, which is compatible with any type.
     pub kind: Option<Kind>,
+    /// True for floats of 32 bits.
+    pub is_single: bool,
 }
 
 impl TraceFile {
@@ -290,7 +292,8 @@ pub(crate) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Ve
     }
     let columns = fields.fields().iter().zip(roots).map(|(field, root)| {
         let text = root.get_basic_info().converted_type() == ConvertedType::UTF8;
-        FileColumn { name: field.name().clone(), kind: kind_of(field.data_type(), text) }
+        let is_single = matches!(field.data_type(), DataType::Float32);
+        FileColumn { name: field.name().clone(), kind: kind_of(field.data_type(), text), is_single }
     });
     Ok(columns.collect())
 }

@@ -23,6 +23,8 @@ use repair::NoObject;
 pub use repair::Repair;
 #[cfg(feature = "sim")]
 pub(crate) use surrogates::without_lone_surrogates;
+#[cfg(feature = "sim")]
+pub(crate) use thoughts::has_object;
 
 use super::{Answers, Reply, Status, Usage, Words, prompt};
 use crate::experiment::Spec;

@@ -81,6 +81,8 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
         Ok(object) => return Ok(without_call(object, raw, Vec::new())),
         Err(fault) => NoObject::Unreadable(fault.to_string()),
     };
+    // A fence may be one of thoughts.
+    has_answer(raw.trim())?;
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
     let steps: [(Repair, Change); 9] = [

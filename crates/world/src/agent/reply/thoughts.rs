@@ -9,20 +9,30 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
+use super::object::Object;
+
 /// A mark that no text has.
 const NEVER: &str = r"[^\s\S]";
 
 /// Each kind of thoughts: the opening mark; the closing mark, which counts without an opening one too; the mark that
 /// closes opened thoughts if there is no other. Closing marks include the header of the answer.
-const MARKS: [[&str; 3]; 8] = [
-    // Qwen, DeepSeek, EXAONE, Seed and others; tags may have a prefix (`seed:think`) and attributes.
+const MARKS: [[&str; 3]; 10] = [
+    // Qwen, DeepSeek, EXAONE and others; tags may have a prefix (`seed:think`, `longcat_think`), attributes, escapes.
     [
-        r"<(?:[\w-]+:)?(?:think|thinking|thoughts?|reasoning|reflection|scratchpad)(?:\s[^<>]*)?>",
-        r"</(?:[\w-]+:)?(?:think|thinking|thoughts?|reasoning|reflection|scratchpad)\s*>",
+        r"(?:<|&lt;)\s*(?:[\w-]+[:_])?(?:think|thinking|thoughts?|reasoning|reflection|scratchpad|analysis)(?:_process)?(?:\s[^<>]*?)?(?:>|&gt;)",
+        r"(?:<|&lt;)\s*/\s*(?:[\w-]+[:_])?(?:think|thinking|thoughts?|reasoning|reflection|scratchpad|analysis)(?:_process)?\s*(?:>|&gt;)",
         NEVER,
     ],
+    // Open WebUI.
+    [r#"<details\s[^<>]*\btype="reasoning"[^<>]*>"#, NEVER, r"</details\s*>"],
+    // Granite.
+    [r"here is my thought process:", NEVER, r"here is my response:"],
     // Mistral.
-    [r"\[think(?:ing)?\]", r"\[/think(?:ing)?\]", NEVER],
+    [
+        r"\[(?:think|thinking|thoughts?|reasoning|analysis)\]",
+        r"\[/(?:think|thinking|thoughts?|reasoning|analysis)\]",
+        NEVER,
+    ],
     // Kimi.
     [r"\x{25c1}think(?:ing)?\x{25b7}", r"\x{25c1}/think(?:ing)?\x{25b7}", NEVER],
     // Harmony (gpt-oss), with every channel but the final one; Gemma 4, `<|channel>thought` to `<channel|>`.
@@ -42,7 +52,11 @@ const MARKS: [[&str; 3]; 8] = [
     // MedGemma.
     ["<unused94>", "<unused95>", NEVER],
     // A fenced block of thoughts ends with the first fence: the answer may have a fence of its own.
-    [r"```\s*(?:think|thinking|thoughts?|reasoning|analysis|reflection|scratchpad)\b", NEVER, r"^[\s\S]*?```"],
+    [
+        r"(?:```|~~~)\s*(?:think|thinking|thoughts?|reasoning|analysis|reflection|scratchpad)\b",
+        NEVER,
+        r"^[\s\S]*?(?:```|~~~)",
+    ],
 ];
 
 /// The mark of the answer's end in the formats that mark its beginning.
@@ -78,8 +92,8 @@ pub(super) enum Thoughts<'a> {
 
 /// Removes the thoughts from a text.
 ///
-/// They end with the last closing mark of their kind, so thoughts may mention the mark. An opening mark counts only
-/// before the first brace: later ones may be in the answer's strings.
+/// They end with the last closing mark of their kind, so thoughts may mention the mark. If only an object follows an
+/// earlier one, they end there: later ones are in the answer's strings, as are opening marks after the first brace.
 pub(super) fn of(text: &str) -> Thoughts<'_> {
     let (mut rest, mut found) = (text, Thoughts::None);
     loop {
@@ -95,6 +109,15 @@ pub(super) fn of(text: &str) -> Thoughts<'_> {
         };
         rest = without_end(&rest[end..]);
         found = Thoughts::Before(rest);
+    }
+}
+
+/// Returns true if a text has an object outside of its thoughts.
+pub(crate) fn has_object(text: &str) -> bool {
+    match of(text) {
+        Thoughts::None => text.contains('{'),
+        Thoughts::Before(answer) => answer.contains('{'),
+        Thoughts::Open => false,
     }
 }
 
@@ -116,7 +139,9 @@ impl Kind {
 }
 
 fn last(mark: &Regex, text: &str) -> Option<usize> {
-    mark.find_iter(text).last().map(|mark| mark.end())
+    let is_object = |end: &usize| Object::parse(without_end(&text[*end..])).is_ok();
+    let mut ends = mark.find_iter(text).map(|mark| mark.end());
+    mark.find_iter(text).map(|mark| mark.end()).find(is_object).or_else(|| ends.by_ref().last())
 }
 
 fn without_end(text: &str) -> &str {
@@ -149,6 +174,20 @@ mod tests {
             ("```thinking\n{1}\n```\n{}", Thoughts::Before("{}")),
             ("```thinking\n{1}\n```\n```json\n{}\n```\nDone.", Thoughts::Before("```json\n{}\n```\nDone.")),
             ("``` reasoning\n{1}\n", Thoughts::Open),
+            ("~~~thinking\n{1}\n~~~\n{}", Thoughts::Before("{}")),
+            ("```thinking\n{1}\n```", Thoughts::Before("")),
+            ("<longcat_think>{1}</longcat_think>{}", Thoughts::Before("{}")),
+            ("< thought_process >{1}</ thought_process >{}", Thoughts::Before("{}")),
+            ("&lt;think&gt;{1}&lt;/think&gt;{}", Thoughts::Before("{}")),
+            ("<analysis>{1}</analysis>{}", Thoughts::Before("{}")),
+            ("<details type=\"reasoning\" done=\"true\"><summary>s</summary>{1}</details>{}", Thoughts::Before("{}")),
+            ("[REASONING]{1}[/REASONING]{}", Thoughts::Before("{}")),
+            ("Here is my thought process: {1} Here is my response: {}", Thoughts::Before("{}")),
+            (
+                "<think>a</think>{\"b\": \"I closed </think> before\"}",
+                Thoughts::Before("{\"b\": \"I closed </think> before\"}"),
+            ),
+            ("<think>a</think>{\"b\": 1}</think>{}", Thoughts::Before("{}")),
             ("```json\n{\"a\": \"```thinking\"}\n```", Thoughts::None),
             ("<think>a [THINK] {1}</think>{}", Thoughts::Before("{}")),
             ("<think>a</think>[THINK]{1}[/THINK]{}", Thoughts::Before("{}")),

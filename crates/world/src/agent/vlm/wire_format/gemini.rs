@@ -77,6 +77,8 @@ pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
 /// The text of a candidate without its thoughts, or the arguments of its function call.
 fn words(candidate: &Value) -> (String, Vec<Repair>) {
     let parts = candidate["content"]["parts"].as_array().map(Vec::as_slice).unwrap_or_default();
-    let words = parts.iter().filter(|part| part["thought"] != true).filter_map(|part| part["text"].as_str()).collect();
-    text_or_call(words, parts.iter().map(|part| &part["functionCall"]["args"]))
+    let is_thought = |part: &&Value| part["thought"] == true || part["thought"] == "true";
+    let answer: Vec<&Value> = parts.iter().filter(|part| !is_thought(part)).collect();
+    let words = answer.iter().filter_map(|part| part["text"].as_str()).collect();
+    text_or_call(words, answer.iter().map(|part| &part["functionCall"]["args"]))
 }

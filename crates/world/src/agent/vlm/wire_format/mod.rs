@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::agent::reply::{Ending, Repair, without_lone_surrogates};
+use crate::agent::reply::{Ending, Repair, has_object, without_lone_surrogates};
 use exact::names;
 
 /// A language.
@@ -182,13 +182,16 @@ pub(crate) fn error_of(body: &Value) -> Option<&Value> {
     body.get("error").or_else(|| body.get(0)?.get("error"))
 }
 
-/// A text, or the arguments of the only call of a function: an object, or its JSON as a string.
+/// A text, or the arguments of the only call of a function: an object, or its JSON as a string. The text beside a call
+/// precedes its arguments, unless it has an object of its own.
 fn text_or_call<'a>(text: String, arguments: impl Iterator<Item = &'a Value>) -> (String, Vec<Repair>) {
     let calls: Vec<_> = arguments.filter(|arguments| !arguments.is_null()).collect();
-    match calls[..] {
-        [Value::String(arguments)] if text.trim().is_empty() => (arguments.clone(), vec![Repair::ToolCall]),
-        [arguments] if text.trim().is_empty() => (arguments.to_string(), vec![Repair::ToolCall]),
-        _ => (text, Vec::new()),
+    let [arguments] = calls[..] else { return (text, Vec::new()) };
+    let arguments = arguments.as_str().map_or_else(|| arguments.to_string(), str::to_owned);
+    match text.trim() {
+        "" => (arguments, vec![Repair::ToolCall]),
+        beside if has_object(beside) => (text, Vec::new()),
+        beside => (format!("{beside}\n{arguments}"), vec![Repair::ToolCall]),
     }
 }
 

@@ -77,7 +77,7 @@ fn content(content: &Value) -> Option<String> {
     match content {
         Value::String(text) => Some(text.clone()),
         Value::Array(parts) => {
-            let is_text = |part: &&Value| part["type"].as_str().is_none_or(|kind| kind.ends_with("text"));
+            let is_text = |part: &&Value| matches!(part["type"].as_str(), None | Some("text" | "output_text"));
             Some(parts.iter().filter(is_text).filter_map(|part| part["text"].as_str()).collect())
         }
         _ => None,

@@ -60,7 +60,6 @@ run score-explain score $paper --explain "$(cd "$root" && "$old" score $paper --
 run score-own score $paper --definitions mine.toml --metrics TURNS
 run score-filter score $paper --where "TSA = 1 and seed = 1"
 run score-empty score $paper --where "seed = 99"
-run score-polars score $paper --engine polars
 run scores-report report scores.parquet --no-figures --out report-scores
 for name in spider heatmap scatter completion-gap e5-outcomes intervals slopes decision-curve gaze; do
   for ending in svg png pdf; do run figure-$name-$ending figure $name $paper -o $name.$ending; done

@@ -19,7 +19,7 @@ use crate::harness::program::{self, Answer};
 use crate::harness::traces::{episode, reader, rows, texts, write_rows};
 
 fn run(folder: &Path, arguments: &[&str]) -> Answer {
-    program::run(folder, &[&["renormalize"], arguments].concat())
+    program::run(folder, &[&["trace", "renormalize"], arguments].concat())
 }
 
 fn step(text: Option<&str>, color: Option<&str>) -> Step {

@@ -8,7 +8,6 @@ use polars::prelude::{
 };
 
 use super::run::PolarsError;
-use score::error::ScoreError;
 use trace::labels::Labels;
 use trace::open::{TraceFile, TraceSet};
 use trace::schema::{Kind, Stored};
@@ -62,13 +61,13 @@ impl FrameColumn {
 /// The steps of all files, in order; rows are read when the frame is collected. Polars does not verify page checksums,
 /// so they are verified here.
 pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
-    verify_pages(traces).map_err(ScoreError::from)?;
+    verify_pages(traces)?;
     let (labels, read): (Vec<&FrameColumn>, Vec<&FrameColumn>) =
         columns.iter().partition(|column| traces.is_label_column(&column.name));
     for file in traces.files() {
         if let Some(column) = read.iter().find(|column| file.folder(&column.name).is_some()) {
             let expected = format!("{}: expected the column `{}` in the file", file.name(), column.name);
-            let help = "use --engine native, or `mirrorstats import` the files first";
+            let help = "`mirrorstats import` the files first";
             return Err(PolarsError::Failed(format!("{expected}, found it in the name of a folder\n  help: {help}")));
         }
     }

@@ -110,8 +110,6 @@ run check-none check $recorded
 run import import steps.jsonl -o imported.parquet
 run import-json import steps.jsonl -o imported-json.parquet --palette red,green --cluster seed --json
 run import-refused import mine.toml -o never.parquet
-run renormalize renormalize $some -o anew
-run renormalize-json renormalize $some --dry-run --json
 run recover recover $recorded/E1-guesser.mcap -o recovered.parquet
 run recover-cut recover cut.mcap -o cut.parquet --json
 for name in trace step experiments experiment reply-cubes reply-exploration; do run schema-$name schema $name --json; done

@@ -46,7 +46,6 @@ fn devices_are_refused_without_being_opened() {
             &["report", "a.parquet", "--definitions", name],
             &["table", "audit", "--n", "21", name],
             &["import", name, "-o", "x.parquet"],
-            &["trace", "renormalize", name, "-o", "x.parquet"],
         ] {
             let told = bounded(at, arguments).refused();
             assert!(told.contains(found), "{arguments:?}: {told}");

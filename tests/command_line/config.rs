@@ -159,7 +159,7 @@ fn a_refused_option_or_command_names_the_right_one() {
 fn shells_and_manuals_know_every_command() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        assert!(run(folder.path(), &["setup", "completions", shell]).done().contains("renormalize"), "{shell}");
+        assert!(run(folder.path(), &["setup", "completions", shell]).done().contains("recover"), "{shell}");
     }
     run(folder.path(), &["setup", "man", "pages/man1"]).ends(0);
     let page = fs::read_to_string(folder.path().join("pages/man1/mirrorstats-score.1")).unwrap();

@@ -105,7 +105,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
 }
 
 /// Every verb that shows names of a trace, in every format for people.
-const SHOWN: [&str; 28] = [
+const SHOWN: [&str; 27] = [
     "report a.parquet b.parquet",
     "stats a.parquet --metric all",
     "figure intervals a.parquet -o figure.svg",
@@ -122,7 +122,6 @@ const SHOWN: [&str; 28] = [
     "trace labels a.parquet",
     "trace validate a.parquet",
     "trace check a.parquet --max-unreadable 0.05",
-    "trace renormalize a.parquet --dry-run",
     "trace seal a.parquet sealed.parquet",
     "trace recover a.parquet -o x.parquet",
     "table compare a.parquet --published table.csv",

@@ -40,19 +40,8 @@ const VERBS: &[Verb] = &[
     verb("report b.parquet --no-figures --out link", "report in --no-figures --out link", &["link"]),
     verb("report b.parquet --no-figures --out r2", "table rescore r1 --definitions extended --out r2", &["r2"]),
     verb("import b.jsonl -o i.parquet", "import a.jsonl -o i.parquet", &["i.parquet"]),
-    verb(
-        "trace renormalize b.parquet --out norm",
-        "trace renormalize old/a.parquet old/b.parquet --out norm",
-        &["norm"],
-    ),
-    verb("", "trace renormalize old --out new/norm", &["new/norm"]),
-    verb(
-        "trace renormalize b.parquet --out link",
-        "trace renormalize old/a.parquet old/b.parquet --out link",
-        &["link"],
-    ),
     verb("trace seal b.parquet sealed.parquet", "trace seal a.parquet sealed.parquet", &["sealed.parquet"]),
-    verb("trace renormalize b.parquet --out man", "setup man man", &["man"]),
+    verb("definitions sensitivity b.parquet --out man", "setup man man", &["man"]),
     verb("score b.parquet -o rec.parquet", "trace recover a.mcap -o rec.parquet", &["rec.parquet"]),
     verb("figure spider b.parquet -o f.svg", "figure spider a.parquet -o f.svg", &["f.svg"]),
     verb("", "plan --episodes 21 --register p.json", &["p.json"]),
@@ -98,10 +87,6 @@ fn prepared() -> TempDir {
     fs::write(path.join("in/lost.jsonl"), format!("{lost}\n")).unwrap();
     run(path, &["report", "a.parquet", "--no-figures", "--out", "r1"]).done();
     // Like `a` and `b`, but with attributions that will change.
-    fs::create_dir(path.join("old")).unwrap();
-    for name in ["a", "b"] {
-        fs::copy(path.join(format!("{name}.parquet")), path.join(format!("old/{name}.parquet"))).unwrap();
-    }
     fs::create_dir(path.join("there")).unwrap();
     std::os::unix::fs::symlink("there", path.join("link")).unwrap();
     folder
@@ -269,7 +254,7 @@ fn soak_refused_memory_leaves_old_or_new_outputs() {
 fn command(home: &Path, words: &str) -> Command {
     let mut command = typed(home, words);
     // With one thread the calls are the same each time.
-    let scanning = ["score", "report", "table rescore", "definitions sensitivity", "trace renormalize", "view"];
+    let scanning = ["score", "report", "table rescore", "definitions sensitivity", "view"];
     if scanning.iter().any(|verb| words.starts_with(verb)) {
         command.args(["--threads", "1"]);
     }

@@ -33,7 +33,7 @@ const WRITERS: [(&str, usize); 7] = [
 ];
 
 /// Commands whose output is equal for all files with the same rows.
-const SAME: [&[&str]; 11] = [
+const SAME: [&[&str]; 9] = [
     &["score", "trace.parquet"],
     &["query", "SELECT * FROM steps ORDER BY episode_id, t", "trace.parquet"],
     &["query", "SELECT * FROM cells ORDER BY experiment, model, metric", "trace.parquet"],
@@ -41,8 +41,6 @@ const SAME: [&[&str]; 11] = [
     &["trace", "check", "trace.parquet", "--max-unreadable", "0.05"],
     &["definitions", "sensitivity", "trace.parquet"],
     &["definitions", "sensitivity", "trace.parquet", "--metrics", "MCR", "--json"],
-    &["trace", "renormalize", "trace.parquet", "-o", "new"],
-    &["score", "new/trace.parquet"],
     &["figure", "intervals", "trace.parquet", "-o", "figure.svg"],
     &["report", "trace.parquet", "--no-figures", "--out", "report"],
 ];

@@ -99,26 +99,19 @@ questions:
 bench: bench-scores bench-world
 
 ## How fast scoring is beside other engines, and where the time goes: benches/RESULTS.md. A quick look, which writes
-## target/bench/RESULTS.md: STEPS=1400000 ROUNDS=3. BENCH_FEATURES=polars builds a second program, with `--engine polars`,
-## which takes minutes more; LARGE=140000000 measures ten times the steps too.
+## target/bench/RESULTS.md: STEPS=1400000 ROUNDS=3. LARGE=140000000 measures ten times the steps too.
 STEPS = 14150000
 FILES = 4
 ROUNDS = 9
 LARGE = 0
 BENCH_RESULTS = $(if $(filter 14150000,$(STEPS)),benches,target/bench)/RESULTS.md
-BENCH_FEATURES =
 BENCH_PYTHON = target/bench-python
 BENCH_PACKAGES = duckdb==2.0.0 polars==2.1.0 pandas==3.1.1 pyarrow==26.0.1
 bench-scores:
 	mkdir -p target/bench
-	if [ -n "$(BENCH_FEATURES)" ]; then \
-		cargo build --release --no-default-features --features "$(BENCH_FEATURES)" --bin mirrorstats && \
-		cp $${CARGO_TARGET_DIR:-target}/release/mirrorstats target/bench/mirrorstats-polars; \
-	fi
 	cargo build --release --no-default-features --bin mirrorstats --example generate --example decode
 	python3 -m pip install --quiet --upgrade --target $(BENCH_PYTHON) $(BENCH_PACKAGES)
 	PYTHONPATH=$(BENCH_PYTHON) python3 scripts/bench/bench.py --program $${CARGO_TARGET_DIR:-target}/release/mirrorstats \
-		--polars "$(if $(BENCH_FEATURES),target/bench/mirrorstats-polars)" \
 		--steps $(STEPS) --files $(FILES) --rounds $(ROUNDS) --large $(LARGE) \
 		--results $(BENCH_RESULTS)
 

@@ -250,7 +250,7 @@ fn repeated(rows: &RecordBatch) -> Result<RecordBatch, Box<dyn Error>> {
 
 /// A Parquet file with these row groups.
 fn parquet(row_groups: &[&RecordBatch], version: Option<&str>) -> Result<Vec<u8>, Box<dyn Error>> {
-    let version = KeyValue::new("mirrorstats.schema_version".to_owned(), version.unwrap_or("1").to_owned());
+    let version = KeyValue::new("mirrorstats.schema_version".to_owned(), version.unwrap_or("2").to_owned());
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_created_by("examples/damage.rs".to_owned())

@@ -25,7 +25,7 @@ def native(program, folder, extra):
 
 
 def independent(program, dialect, folder, extra):
-    statement = run(program, "sql", "--dialect", dialect, *extra)
+    statement = run(program, "definitions", "sql", "--dialect", dialect, *extra)
     connection = duckdb.connect()
     source = f"read_parquet('{folder}/*.parquet', union_by_name = true)"
     connection.execute(f"CREATE VIEW steps AS SELECT * FROM {source}")

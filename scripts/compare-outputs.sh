@@ -60,7 +60,6 @@ run score-explain score $paper --explain "$(cd "$root" && "$old" score $paper --
 run score-own score $paper --definitions mine.toml --metrics TURNS
 run score-filter score $paper --where "TSA = 1 and seed = 1"
 run score-empty score $paper --where "seed = 99"
-run score-polars score $paper --engine polars
 run scores-report report scores.parquet --no-figures --out report-scores
 for name in spider heatmap scatter completion-gap e5-outcomes intervals slopes decision-curve gaze; do
   for ending in svg png pdf; do run figure-$name-$ending figure $name $paper -o $name.$ending; done
@@ -111,8 +110,6 @@ run check-none check $recorded
 run import import steps.jsonl -o imported.parquet
 run import-json import steps.jsonl -o imported-json.parquet --palette red,green --cluster seed --json
 run import-refused import mine.toml -o never.parquet
-run renormalize renormalize $some -o anew
-run renormalize-json renormalize $some --dry-run --json
 run recover recover $recorded/E1-guesser.mcap -o recovered.parquet
 run recover-cut recover cut.mcap -o cut.parquet --json
 for name in trace step experiments experiment reply-cubes reply-exploration; do run schema-$name schema $name --json; done

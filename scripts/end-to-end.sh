@@ -54,13 +54,6 @@ mirrorstats trace recover "$out/runs/E4-random.mcap" --out "$out/recovered.parqu
 cmp "$out/runs/E4-random.parquet" "$out/recovered.parquet"
 mirrorstats world replay "$out/runs"
 
-echo "end-to-end: the same scores from the SQL lowering on Polars, byte for byte"
-mirrorstats score fixtures/paper >"$out/native.csv"
-mirrorstats score fixtures/paper --engine polars >"$out/polars.csv"
-cmp "$out/native.csv" "$out/polars.csv"
-mirrorstats report fixtures/paper --style paper --engine polars --out "$out/polars" >/dev/null
-diff -r "$out/paper" "$out/polars"
-
 echo "end-to-end: requests to models are those of the official client libraries"
 # From 2.0 on, Anthropic's library speaks a version of the API that refuses a temperature.
 clients=$target/python-clients

@@ -25,7 +25,7 @@
 //! | `score` | logical plan, physical plan, and kernels over Arrow batches; the episode table |
 //! | `statistics` | intervals, tests, survival, power: numbers in, numbers out |
 //! | `report` | cells, styles, tables, figures, statistics for people, the folder of a report |
-//! | `engines` | other engines for the SQL of definitions: Polars, Spark |
+//! | `engines` | other engines: Polars for queries, Spark for scores |
 //! | `study` | inputs, definitions and a filter, opened and scanned once; every answer is a function of it |
 //! | `world` | experiments, the MuJoCo world, agents, recordings, replays (feature `sim`) |
 //! | `view` | the local web application (feature `view`) |

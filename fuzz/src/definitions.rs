@@ -30,7 +30,7 @@ pub fn target(data: &[u8]) {
         }
     };
     reached("bound");
-    for dialect in [Dialect::Portable, Dialect::Spark, Dialect::Duckdb, Dialect::Polars] {
+    for dialect in [Dialect::Portable, Dialect::Spark, Dialect::Duckdb] {
         let first = sql::lower(&definitions.plan, dialect);
         assert_eq!(first, sql::lower(&definitions.plan, dialect), "two statements of one plan");
     }

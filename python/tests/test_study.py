@@ -197,8 +197,8 @@ def test_answers_equal_those_of_the_command_line(paper, command):
     episode = "E1/gpt-5-1/s1/r2"
     assert study.explain(episode) == json.loads(command("score", paper, "--explain", episode, "--json").stdout)
     assert str(study.explain(episode)).strip() == command("score", paper, "--explain", episode).stdout.strip()
-    assert ms.validate(paper) == json.loads(command("validate", paper, "--json").stdout)
-    assert str(ms.validate(paper)) == command("validate", paper).stdout
+    assert ms.validate(paper) == json.loads(command("trace", "validate", paper, "--json").stdout)
+    assert str(ms.validate(paper)) == command("trace", "validate", paper).stdout
     shown = study.stats()._repr_html_()
     assert shown.startswith("<pre style=") and "overflow-x" in shown and "&lt;0.0001" in shown and "<0.0001" not in shown
 

@@ -61,17 +61,16 @@ class Bench:
         paths = {}
         for dialect in ("portable", "duckdb"):
             paths[dialect] = self.data / f"{dialect}.sql"
-            command = [self.program, "sql", "--dialect", dialect]
+            command = [self.program, "definitions", "sql", "--dialect", dialect]
             paths[dialect].write_bytes(subprocess.run(command, check=True, capture_output=True).stdout)
         return paths
 
-    def contenders(self, folder, polars):
+    def contenders(self, folder):
         """All that have turns; the episode to explain is the middle one of the table."""
         scores = self.outputs / "first.parquet"
         timing.run([self.program, "score", folder, "-o", scores])
         listed = c.ours(self.program, checks.middle_episode(scores))
-        listed += c.floors(self.examples) + c.rivals(self.statements())
-        return listed + ([c.engine_polars(Path(polars).resolve())] if polars else [])
+        return listed + c.floors(self.examples) + c.rivals(self.statements())
 
 
 def digest(path):
@@ -133,8 +132,7 @@ def epilogue():
         "",
         "Run `make bench-scores`. For a quick look that does not replace this file, run `make bench-scores STEPS=1400000",
         "ROUNDS=3`. The variables are `STEPS`, `FILES` and `ROUNDS`. `LARGE=140000000` adds a larger set.",
-        "`BENCH_FEATURES=polars` builds a second program with `--engine polars`, which takes minutes. Nothing else should run",
-        "on the machine. `cargo bench --bench kernels` measures the kernels alone.",
+        "Nothing else should run on the machine. `cargo bench --bench kernels` measures the kernels alone.",
         "",
     ]
 
@@ -142,7 +140,6 @@ def epilogue():
 def parsed():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--program", default=REPOSITORY / "target/release/mirrorstats")
-    parser.add_argument("--polars", default="", help="a program with `--engine polars` built in")
     parser.add_argument("--data", default=REPOSITORY / "target/bench")
     parser.add_argument("--steps", type=int, default=14_150_000)
     parser.add_argument("--files", type=int, default=4)
@@ -161,7 +158,7 @@ def measure(bench, options):
     """Checks and times everything; gives the lines of RESULTS.md and how many goals were missed."""
     folders = {data: bench.generate(data, options.steps, options.files) for data in table.ALL}
     skipped = options.skip.split(";")
-    listed = bench.contenders(folders[table.SHUFFLED], options.polars)
+    listed = bench.contenders(folders[table.SHUFFLED])
     listed = [contender for contender in listed if contender.own or contender.name not in skipped]
     turns = timing.Turns()
     for data, folder in folders.items():

@@ -15,7 +15,7 @@ ONE_THREAD = "score --threads 1"
 TWO_THREADS = "score --threads 2"
 REPORT = "report --no-figures"
 DIFF = "diff, one definition changed"
-INFO, VALIDATE, STATS, EXPLAIN = "info", "validate", "stats", "score --explain, one episode"
+INFO, VALIDATE, STATS, EXPLAIN = "trace info", "trace validate", "stats", "score --explain, one episode"
 PAGES = "page floor: read and decompress"
 DECODE = "library decode"
 PACKED, GENERAL = "DuckDB by hand, packed", "DuckDB by hand, general"
@@ -23,7 +23,6 @@ POLARS = "Polars by hand"
 CELLS = "DuckDB by hand, cells alone"
 DUCKDB_SQL, POLARS_SQL = "DuckDB, generated SQL", "Polars, generated SQL"
 PANDAS = "pandas, one run"
-ENGINE_POLARS = "score --engine polars"
 
 
 def ours(program, episode):
@@ -42,8 +41,8 @@ def ours(program, episode):
         own(ONE_THREAD, "score", "--threads", "1", **score | {"out": "score-1.parquet"}),
         own(REPORT, "report", "--no-figures", out="report", tail=["--out"]),
         own(DIFF, "diff", "paper", CHANGED),
-        own(INFO, "info"),
-        own(VALIDATE, "validate"),
+        own(INFO, "trace", "info"),
+        own(VALIDATE, "trace", "validate"),
         own(STATS, "stats"),
         own(EXPLAIN, "score", "--explain", episode),
     ]
@@ -79,9 +78,3 @@ def rivals(sql):
         rival(POLARS_SQL, "polars-sql", sql["portable"]),
         rival(PANDAS, "pandas", once=True),
     ]
-
-
-def engine_polars(program):
-    """Our program with Polars built in: some 100 MB larger, so the others are measured without it."""
-    command = [program, "score", "--engine", "polars"]
-    return Contender(ENGINE_POLARS, lambda folder, out: [*command, folder, "-o", out], out="engine-polars.parquet")

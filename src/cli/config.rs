@@ -17,7 +17,6 @@ use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use crate::cli::names;
 use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
 use exact::budget::{self, Limit};
 use exact::escape::visible;
@@ -199,7 +198,7 @@ impl<'a> OptionFile<'a> {
                 continue;
             };
             let name = key.get_ref().as_ref();
-            let path = if path.is_empty() { names::current_section(name) } else { joined(path, name) };
+            let path = joined(path, name);
             if self.choices.iter().any(|choice| is_within(&choice.command, &path)) {
                 self.table(inner, &path, found);
             } else {
@@ -309,8 +308,8 @@ fn of_environment(choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
     let mut found = Vec::new();
     for choice in choices {
         let long = choice.arg.get_long().unwrap_or_default();
-        let of_one = names_of(&choice.command).map(|name| (Some(choice.command.clone()), variable(name, long)));
-        for (command, variable) in std::iter::once((None, variable("", long))).chain(of_one) {
+        let of_one = (Some(choice.command.clone()), variable(&choice.command, long));
+        for (command, variable) in [(None, variable("", long)), of_one] {
             let Some(value) = env::var_os(&variable) else { continue };
             let value = value.into_string().map_err(|_| refused(&variable, "expected UTF-8 text"))?;
             let origin = Origin::Variable(variable.clone());
@@ -335,7 +334,7 @@ pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
         .iter()
         .flat_map(|choice| {
             let long = choice.arg.get_long().unwrap_or_default();
-            std::iter::once("").chain(names_of(&choice.command)).map(|name| variable(name, long)).collect::<Vec<_>>()
+            ["", &choice.command].map(|name| variable(name, long))
         })
         .chain([FILE_VARIABLE, ERRORS_VARIABLE, budget::SETTING].map(str::to_owned))
         .collect();
@@ -352,10 +351,6 @@ pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
 fn variable(command: &str, long: &str) -> String {
     let name = joined(command, long).replace(['-', ' '], "_").to_ascii_uppercase();
     format!("{PREFIX}{name}")
-}
-
-fn names_of(command: &str) -> impl Iterator<Item = &str> {
-    std::iter::once(command).chain(names::before(command))
 }
 
 fn refused(variable: &str, why: &str) -> Failure {

@@ -8,7 +8,6 @@ pub mod commands;
 mod config;
 mod features;
 mod help;
-mod names;
 mod outcome;
 mod output;
 #[cfg(feature = "sim")]
@@ -83,7 +82,7 @@ fn told_of_large_files() -> io::Result<()> {
 
 /// Like [`run`], but returns the code as a number, for a process that belongs to a caller.
 pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let arguments = names::current(arguments.into_iter().collect());
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
     let format = ErrorFormat::asked_for(&arguments);
     let answer = caught(|| execute(arguments.clone())).unwrap_or_else(|fault| Err(Failure::Panic(fault)));
     let answer = answer.map_err(|failure| scoring::with_commands(failure, &arguments));

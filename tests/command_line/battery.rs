@@ -146,12 +146,6 @@ fn the_battery_is_as_worked_out_by_hand() {
     assert_eq!(by_id(&scores(&files(), "native")), EXPECTED);
 }
 
-#[cfg(feature = "polars")]
-#[test]
-fn the_battery_is_the_same_by_sql() {
-    assert_eq!(by_id(&scores(&files(), "polars")), EXPECTED);
-}
-
 #[test]
 fn reports_of_the_paper_have_no_battery() {
     let expected: String = EXPECTED

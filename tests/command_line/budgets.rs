@@ -37,21 +37,20 @@ fn devices_are_refused_without_being_opened() {
     for (name, found) in devices {
         for arguments in [
             &["score", name][..],
-            &["info", name],
+            &["trace", "info", name],
             &["report", name],
             &["stats", name],
             &["definitions", "check", name],
             &["score", "a.parquet", "--definitions", name],
             &["report", "a.parquet", "--style", name],
             &["report", "a.parquet", "--definitions", name],
-            &["audit", "--n", "21", name],
+            &["table", "audit", "--n", "21", name],
             &["import", name, "-o", "x.parquet"],
-            &["renormalize", name, "-o", "x.parquet"],
         ] {
             let told = bounded(at, arguments).refused();
             assert!(told.contains(found), "{arguments:?}: {told}");
         }
-        assert!(bounded(at, &["validate", name]).ends(1).stdout.contains(found));
+        assert!(bounded(at, &["trace", "validate", name]).ends(1).stdout.contains(found));
     }
 }
 
@@ -118,7 +117,7 @@ fn a_statement_is_counted_while_it_is_written() {
         text += "[metric.M]\nvalue = \"any(x40)\"\n[metric.N]\nvalue = \"at(x40, first(x40))\"\n";
         fs::write(at.join("d.toml"), &text).unwrap();
         for dialect in ["portable", "duckdb", "spark"] {
-            let arguments = ["sql", "--definitions", "d.toml", "--dialect", dialect];
+            let arguments = ["definitions", "sql", "--definitions", "d.toml", "--dialect", dialect];
             over_budget(bounded(at, &arguments), "the statement exceeds 4194304 bytes");
         }
         // The engine computes shared parts once, so this is fast.
@@ -146,7 +145,7 @@ fn chunks_are_unpacked_within_a_budget() {
         let log = log(chunks, bytes);
         assert!(log.len() < 100_000, "{}", log.len());
         fs::write(folder.path().join("bomb.mcap"), log).unwrap();
-        let told = bounded(folder.path(), &["recover", "bomb.mcap", "-o", "x.parquet"]).ends(3).stdout;
+        let told = bounded(folder.path(), &["trace", "recover", "bomb.mcap", "-o", "x.parquet"]).ends(3).stdout;
         assert!(told.contains("is not unpacked: expected at most") && told.contains(SETTING), "{told}");
     }
 }
@@ -165,7 +164,7 @@ fn texts_and_names_of_traces_are_counted() {
     long.steps = (0..160).map(step).collect();
     write_episodes(&at.join("texts.parquet"), None, &[long]).unwrap();
     assert!(fs::metadata(at.join("texts.parquet")).unwrap().len() < 100_000);
-    let told = bounded(at, &["validate", "texts.parquet"]).ends(1).stdout;
+    let told = bounded(at, &["trace", "validate", "texts.parquet"]).ends(1).stdout;
     assert!(told.contains("over-budget") && told.contains("bytes inflated") && told.contains(SETTING), "{told}");
     // A command that does not read the texts is not limited by them.
     bounded(at, &["score", "texts.parquet"]).done();

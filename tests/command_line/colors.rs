@@ -72,7 +72,7 @@ fn write(path: &Path, colors: Colors, recording: Option<&str>) {
 
 /// The findings of `validate --json`, and its exit code.
 fn findings(folder: &Path, traces: &[&str]) -> (i32, Vec<Value>) {
-    let answer = run(folder, &[&["validate", "--json"], traces].concat());
+    let answer = run(folder, &[&["trace", "validate", "--json"], traces].concat());
     let report: Value = serde_json::from_str(&answer.stdout).unwrap();
     (answer.code, report["findings"].as_array().unwrap().clone())
 }
@@ -82,12 +82,7 @@ fn refused(folder: &Path, traces: &[&str]) -> String {
     let by = ["--by", "experiment,model,stated_color"];
     let of = |before: &[&str], after: &[&str]| run(folder, &[before, traces, after].concat()).refused();
     let message = of(&["report", "--out", "out"], &by);
-    for (before, after) in [
-        (&["stats"][..], &by[..]),
-        (&["report", "--out", "out", "--threads", "1"], &by),
-        #[cfg(feature = "polars")]
-        (&["report", "--out", "out", "--engine", "polars"], &by),
-    ] {
+    for (before, after) in [(&["stats"][..], &by[..]), (&["report", "--out", "out", "--threads", "1"], &by)] {
         assert_eq!(of(before, after), message, "{before:?}");
     }
     assert!(!folder.join("out").exists());
@@ -149,8 +144,6 @@ fn check(column: &str, text: &'static str, shown: &str, help: &str) {
     if column != "stated_color" {
         // The paper's metrics read the other three columns.
         assert_eq!(run(folder.path(), &["score", "a.parquet"]).refused(), message);
-        #[cfg(feature = "polars")]
-        assert_eq!(run(folder.path(), &["score", "--engine", "polars", "a.parquet"]).refused(), message);
     }
 }
 
@@ -340,7 +333,8 @@ fn an_entry_of_a_dictionary_that_no_row_has_is_not_refused() {
 
 #[test]
 fn the_fixtures_keep_the_rules() {
-    let Answer { code, stdout, .. } = run(&fixture(""), &["validate", "paper", "recorded", "glimpses.parquet"]);
+    let Answer { code, stdout, .. } =
+        run(&fixture(""), &["trace", "validate", "paper", "recorded", "glimpses.parquet"]);
     assert_eq!(code, 0, "{stdout}");
     assert!(stdout.ends_with("0 errors, 0 notes\n"), "{stdout}");
 }

@@ -66,7 +66,7 @@ fn flags_and_lists_may_stand_in_the_file() {
 fn every_setting_is_shown_with_where_it_comes_from() {
     let folder = configured("threads = 2\n[\"definitions\".check]\njson = true\n");
     let variables = [("MIRRORSTATS_RECORD_OUT", "runs"), ("MIRRORSTATS_TREADS", "3")];
-    let shown = with(folder.path(), &variables, &["config", "--json"]);
+    let shown = with(folder.path(), &variables, &["setup", "config", "--json"]);
     let expected = json!({
         "file": "mirrorstats.toml",
         "settings": [
@@ -85,7 +85,7 @@ fn every_setting_is_shown_with_where_it_comes_from() {
         expected
     };
     assert_eq!(serde_json::from_str::<Value>(&shown.stdout).unwrap(), settings);
-    let Answer { stdout: text, stderr, .. } = with(folder.path(), &variables, &["config"]);
+    let Answer { stdout: text, stderr, .. } = with(folder.path(), &variables, &["setup", "config"]);
     assert!(stderr.contains("MIRRORSTATS_TREADS sets nothing") && stderr.contains("did you mean"), "{stderr}");
     assert!(text.contains("configuration file: mirrorstats.toml") && text.contains("--threads"), "{text}");
 }
@@ -159,7 +159,7 @@ fn a_refused_option_or_command_names_the_right_one() {
 fn shells_and_manuals_know_every_command() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        assert!(run(folder.path(), &["setup", "completions", shell]).done().contains("renormalize"), "{shell}");
+        assert!(run(folder.path(), &["setup", "completions", shell]).done().contains("recover"), "{shell}");
     }
     run(folder.path(), &["setup", "man", "pages/man1"]).ends(0);
     let page = fs::read_to_string(folder.path().join("pages/man1/mirrorstats-score.1")).unwrap();

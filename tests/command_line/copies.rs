@@ -25,8 +25,8 @@ fn validate_names_the_copies_of_episodes() {
     let at = folder.path();
     trace(&at.join("whole.parquet"), 0);
     trace(&at.join("twice.parquet"), 2);
-    assert!(!run(at, &["validate", "whole.parquet"]).done().contains("copied"));
-    let report: Value = run(at, &["validate", "twice.parquet", "--json"]).json();
+    assert!(!run(at, &["trace", "validate", "whole.parquet"]).done().contains("copied"));
+    let report: Value = run(at, &["trace", "validate", "twice.parquet", "--json"]).json();
     let findings: Vec<&Value> = report["findings"].as_array().unwrap().iter().collect();
     let copies: Vec<_> = findings.iter().filter(|finding| finding["code"] == "copied-episode").collect();
     let ids: Vec<_> = copies.iter().map(|finding| finding["episode"].as_str().unwrap()).collect();
@@ -38,7 +38,7 @@ fn validate_names_the_copies_of_episodes() {
     other.steps[0].self_color = None;
     let other = Episode { episode_id: "other".into(), ..other };
     write_episodes(&at.join("other.parquet"), None, &[episode("ant", "E1", 7, "red"), other]).unwrap();
-    assert!(!run(at, &["validate", "other.parquet"]).done().contains("copied"));
+    assert!(!run(at, &["trace", "validate", "other.parquet"]).done().contains("copied"));
 }
 
 #[test]

@@ -129,23 +129,20 @@ fn every_command_takes_a_declared_experiment() {
     let at = folder.path();
     run(at, &[&["report", "--out", "report"], &TRACES[..]].concat()).done();
     for arguments in [
-        &["validate"][..],
-        &["info"],
-        &["score", "-o", "native.csv"],
-        &["score", "-o", "polars.csv", "--engine", "polars"],
+        &["trace", "validate"][..],
+        &["trace", "info"],
+        &["score"],
         &["score", "--explain", "six-E6-0"],
         &["stats", "--sequential"],
         &["figure", "heatmap", "-o", "heatmap.svg"],
         &["figure", "slopes", "-o", "slopes.svg"],
-        &["sql"],
+        &["definitions", "sql"],
     ] {
         run(at, &[arguments, &TRACES[..]].concat()).done();
     }
     // No recording states losses, so the limit cannot be checked.
-    let checked = run(at, &[&["check", "--max-lost", "0"], &TRACES[..]].concat()).ends(1);
+    let checked = run(at, &[&["trace", "check", "--max-lost", "0"], &TRACES[..]].concat()).ends(1);
     assert!(checked.stdout.contains(" E6 "), "{}", checked.stdout);
-    let [native, polars] = ["native.csv", "polars.csv"].map(|name| fs::read_to_string(at.join(name)).unwrap());
-    assert_eq!(native, polars);
     let asked = ["query", "SELECT experiment, COUNT(*) AS n FROM episodes GROUP BY experiment ORDER BY n, experiment"];
     let answer = run(at, &[&asked, &TRACES[..], &["--format", "csv"]].concat()).done();
     assert_eq!(answer, "experiment,n\nA7,8\nE1,8\nE6,8\n");
@@ -208,8 +205,6 @@ fn an_undeclared_experiment_is_refused() {
         message.contains("unknown-experiment: nine.parquet") && message.contains("E5, E6\n  found `E9`"),
         "{message}"
     );
-    let polars = run(at, &["score", "nine.parquet", "--engine", "polars"]).refused();
-    assert!(polars.contains("unknown-experiment: nine.parquet"), "{polars}");
     let told = run(at, &["trace", "validate", "nine.parquet"]).ends(1).stdout;
     assert!(told.contains("unknown-experiment") && told.contains("found `E9`"), "{told}");
     // A trace's declaration also applies to the traces beside it, in any order.
@@ -217,7 +212,7 @@ fn an_undeclared_experiment_is_refused() {
     assert!(run(at, &["score", "bare.parquet"]).refused().contains("found `E6`"));
     for pair in [["bare.parquet", "six.parquet"], ["six.parquet", "bare.parquet"]] {
         run(at, &[&["score"], &pair[..]].concat()).done();
-        run(at, &[&["validate"], &pair[..]].concat()).done();
+        run(at, &[&["trace", "validate"], &pair[..]].concat()).done();
     }
     // Text formats keep declarations too.
     run(at, &["score", "six.parquet", "-o", "scores.parquet"]).done();
@@ -254,7 +249,7 @@ fn files_that_declare_one_experiment_differently_are_refused_together() {
         let message = run(at, &[&["report"], &both[..]].concat()).refused();
         let expected = format!("zero.parquet: expected {}", words.replace('@', "`six.parquet`"));
         assert!(message.contains(&expected), "{message}");
-        let told = run(at, &[&["validate"], &both[..]].concat()).ends(1).stdout;
+        let told = run(at, &[&["trace", "validate"], &both[..]].concat()).ends(1).stdout;
         let expected = "invalid-metadata: zero.parquet\n  expected the";
         assert!(told.contains(expected) && told.contains("as `six.parquet` declares it"), "{told}");
         for name in ["six", "zero"] {
@@ -301,7 +296,7 @@ fn an_invalid_declaration_is_reported_with_its_file() {
         ("order", json!("first"), "experiment.order` to be a whole number"),
     ] {
         write(at, "bad", "E6", &json!({ "experiment": with(six(), key, value) }));
-        for arguments in [&["score"][..], &["report", "known.parquet"], &["score", "--engine", "polars"]] {
+        for arguments in [&["score"][..], &["report", "known.parquet"]] {
             let message = run(at, &[arguments, &["bad.parquet"]].concat()).refused();
             assert!(message.contains("bad.parquet") && message.contains(words), "{message}");
         }
@@ -324,7 +319,7 @@ fn names_and_titles_with_markup_are_shown_as_text() {
         let text = if is_text { String::from_utf8(bytes).unwrap() } else { String::new() };
         assert!(!text.contains(['\u{1b}', '\u{202e}', '\u{7}']) && !text.contains("<script>alert"), "{path}");
     }
-    for arguments in [&["stats"][..], &["validate"], &["info"]] {
+    for arguments in [&["stats"][..], &["trace", "validate"], &["trace", "info"]] {
         let answer = run(at, &[arguments, &["odd.parquet"]].concat());
         assert!(!answer.stdout.contains(['\u{1b}', '\u{202e}', '\u{7}']), "{}", answer.stdout);
     }

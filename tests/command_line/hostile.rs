@@ -59,8 +59,8 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         &["report", "a.parquet", "--by", "episode_id,model"],
         &["stats", "a.parquet", "--metric", "all"],
         &["stats", "a.parquet", "--sequential", "--metric", "all"],
-        &["info", "a.parquet"],
-        &["validate", "a.parquet"],
+        &["trace", "info", "a.parquet"],
+        &["trace", "validate", "a.parquet"],
         &["score", "a.parquet", "--explain", "E1-\u{1b}[31mred\u{1b}[0m-0"],
         &["diff", "paper", "extended", "a.parquet"],
     ] {
@@ -84,12 +84,12 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         &["score", "a.parquet", "--\u{1b}[31m"],
         &["\u{1b}[31m\u{202e}"],
         &["score", "a.parquet", "--threads", "\u{1b}[31m\u{202e}\r"],
-        &["completions", "\u{1b}]0;title\u{7}"],
+        &["setup", "completions", "\u{1b}]0;title\u{7}"],
         &["diff", "paper", "\u{1b}[31m", "a.parquet"],
         &["definitions", "check", "\u{1b}[31m"],
-        &["verify", "\u{1b}[31m"],
+        &["table", "verify", "\u{1b}[31m"],
         &["import", "\u{1b}[31m", "-o", "b.parquet"],
-        &["recover", "\u{1b}[31m", "-o", "b.parquet"],
+        &["trace", "recover", "\u{1b}[31m", "-o", "b.parquet"],
     ] {
         let answer = run(at, arguments);
         check(&answer);
@@ -105,7 +105,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
 }
 
 /// Every verb that shows names of a trace, in every format for people.
-const SHOWN: [&str; 28] = [
+const SHOWN: [&str; 27] = [
     "report a.parquet b.parquet",
     "stats a.parquet --metric all",
     "figure intervals a.parquet -o figure.svg",
@@ -122,7 +122,6 @@ const SHOWN: [&str; 28] = [
     "trace labels a.parquet",
     "trace validate a.parquet",
     "trace check a.parquet --max-unreadable 0.05",
-    "trace renormalize a.parquet --dry-run",
     "trace seal a.parquet sealed.parquet",
     "trace recover a.parquet -o x.parquet",
     "table compare a.parquet --published table.csv",
@@ -201,7 +200,7 @@ fn the_name_of_a_file_is_escaped() {
     let folder = tempfile::tempdir().unwrap();
     let name = "\u{1b}[31mred.parquet";
     write_episodes(&folder.path().join(name), None, &[episode("m", "E9", 1, "red")]).unwrap();
-    for command in ["score", "validate", "info", "report"] {
-        check(&run(folder.path(), &[command, "."]));
+    for command in [&["score"][..], &["trace", "validate"], &["trace", "info"], &["report"]] {
+        check(&run(folder.path(), &[command, &["."]].concat()));
     }
 }

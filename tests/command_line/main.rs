@@ -43,7 +43,6 @@ mod reference;
 mod reference_files;
 mod refusals;
 #[cfg(unix)]
-mod renamed;
 mod reports;
 mod scores;
 mod sensitivity;

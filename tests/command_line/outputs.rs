@@ -37,8 +37,6 @@ fn an_input_trace_is_refused_as_the_output() {
         &["score", ".", "--engine", "native", "-o"],
         &["figure", "spider", "a.parquet", "--format", "svg", "-o"],
         #[cfg(feature = "polars")]
-        &["score", "a.parquet", "--engine", "polars", "-o"],
-        #[cfg(feature = "polars")]
         &["query", "SELECT * FROM steps", "a.parquet", "-o"],
         #[cfg(feature = "polars")]
         &["query", "SELECT * FROM steps", "a.parquet", "--format", "table", "-o"],
@@ -136,7 +134,7 @@ fn a_folder_with_inputs_is_refused_as_the_output() {
     fs::copy(folder.path().join("a.parquet"), runs.join("deep/a.parquet")).unwrap();
     let before = contents(folder.path());
     for (input, out) in [("runs", "runs"), ("runs/deep/a.parquet", "runs"), ("runs/deep", "runs/../runs/deep/.")] {
-        for command in [&["report", "--no-figures"][..], &["sensitivity"]] {
+        for command in [&["report", "--no-figures"][..], &["definitions", "sensitivity"]] {
             let message = run(folder.path(), &[command, &[input, "--out", out]].concat()).refused();
             assert!(message.contains(&format!("`{out}`: expected a folder for outputs, found an input")), "{message}");
             assert!(message.contains("\n  help: name another folder"), "{message}");

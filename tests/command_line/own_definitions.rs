@@ -87,8 +87,6 @@ fn each_command_takes_the_definitions_that_the_traces_name() {
         assert_eq!(scored(at, traces, "TSA"), found);
     }
     assert_eq!(scored(at, &["reach.parquet"], "SUCCESS"), ["1", "1"]);
-    #[cfg(feature = "polars")]
-    assert_eq!(scored(at, &["mark.parquet", "--engine", "polars"], "MARK_REPORT"), ["1", "1"]);
     let manifest = |trace: &str| -> Value {
         run(at, &["report", trace, "--out", "out", "--no-figures"]).done();
         serde_json::from_str(&std::fs::read_to_string(at.join("out/manifest.json")).unwrap()).unwrap()

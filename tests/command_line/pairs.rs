@@ -81,8 +81,6 @@ const TEXTS: Walk = Walk {
         ("score a.parquet -o scores.csv", Answer),
         ("score a.parquet --definitions few.toml -o few.csv", Answer),
         ("score a.parquet --definitions branches.toml -o s.csv", Limit("values of the definitions")),
-        ("trace renormalize a.parquet -o new", Limit("bytes of changed attributions")),
-        ("trace renormalize a.parquet --dry-run --json", Limit("bytes of changed attributions")),
         ("view a.parquet --export page", Limit("steps times columns of an episode")),
     ],
 };

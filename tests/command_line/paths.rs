@@ -51,15 +51,15 @@ fn run(folder: &tempfile::TempDir, words: &str) -> Answer {
 fn a_path_may_be_invalid_utf8() {
     let folder = folder();
     for words in [
-        "info @",
-        "info --episodes @",
-        "info --json @",
-        "validate @ --definitions @.toml",
+        "trace info @",
+        "trace info --episodes @",
+        "trace info --json @",
+        "trace validate @ --definitions @.toml",
         "score @ --definitions @.toml -o @.csv",
         "score @ -o @-scores.parquet",
         "report @ --definitions @.toml --style @-style.toml --out @-report",
-        "verify @-report",
-        "rescore @-report --definitions @.toml --style @-style.toml --out @-again",
+        "table verify @-report",
+        "table rescore @-report --definitions @.toml --style @-style.toml --out @-again",
         "report @-scores.parquet --out @-from-scores",
         "stats @ --definitions @.toml",
         "diff paper @.toml @",
@@ -68,8 +68,8 @@ fn a_path_may_be_invalid_utf8() {
         "definitions explain MCR --definitions @.toml",
         "figure intervals @ --style @-style.toml -o @.svg",
         "import @.jsonl -o @-imported.parquet",
-        "sql @",
-        "man @-man",
+        "definitions sql @",
+        "setup man @-man",
     ] {
         run(&folder, words).done();
     }
@@ -80,7 +80,7 @@ fn a_path_may_be_invalid_utf8() {
         assert!(path.is_file(), "{}", path.display());
     }
     // The listing shows the name as text.
-    let listed = run(&folder, "info --episodes @").done();
+    let listed = run(&folder, "trace info --episodes @").done();
     assert!(listed.contains("b\u{fffd}\\u{1b}[31m/b\u{fffd}\\u{1b}[31ma.parquet"), "{listed}");
 }
 
@@ -101,8 +101,6 @@ fn globs_and_lists_find_names_with_invalid_utf8() {
 #[test]
 fn polars_reads_paths_with_invalid_utf8() {
     let folder = folder();
-    let expected = run(&folder, "score @").done();
-    assert_eq!(run(&folder, "score @ --engine polars").done(), expected);
     let mut command = program(folder.path());
     command.args(["query", "SELECT COUNT(*) AS n FROM steps", "--format", "csv"]).arg(odd(""));
     assert_eq!(answer(&mut command).done(), "n\n48\n");
@@ -117,13 +115,13 @@ fn recordings_and_experiments_may_have_names_with_invalid_utf8() {
     run(&folder, "experiments check @-mine.toml").done();
     run(&folder, "experiments explain @-mine.toml").done();
     run(&folder, "record --agent frozen --experiment @-mine.toml --seeds 1 --runs 1 --no-frames --out @-runs").done();
-    run(&folder, "replay @-runs").done();
+    run(&folder, "world replay @-runs").done();
     let [mut trace, mut log] = [folder.path().join(odd("-runs")), folder.path().join(odd("-runs"))];
     trace.push("mine-frozen.parquet");
     log.push("mine-frozen.mcap");
     assert!(trace.is_file() && log.is_file());
     let mut command = program(folder.path());
-    command.arg("recover").arg(&log).arg("-o").arg(folder.path().join(odd("-recovered.parquet")));
+    command.args(["trace", "recover"]).arg(&log).arg("-o").arg(folder.path().join(odd("-recovered.parquet")));
     answer(&mut command).done();
 }
 
@@ -134,7 +132,7 @@ fn the_name_of_a_missing_file_is_escaped() {
         "score @-none",
         "report @ --definitions @-none.toml",
         "report @ --style @-none.toml",
-        "verify @-none",
+        "table verify @-none",
         "import @-none -o x.parquet",
         "diff @-none.toml paper @",
     ] {

@@ -159,7 +159,7 @@ fn a_limit_on_replies_that_are_recorded_in_part_is_not_satisfied() {
     let unknown = [episode("e2", vec![Step { action: Some(Action::Done), ..Step::default() }])];
     write_trace(&at.join("b.parquet"), &unknown, OptionalColumns::NONE);
     let limits = ["--max-unreadable", "1", "--max-lost", "0", "--max-latency", "1000"];
-    let answer = |files: &[&str]| run(at, &[&["check"], files, &limits].concat());
+    let answer = |files: &[&str]| run(at, &[&["trace", "check"], files, &limits].concat());
     answer(&["a.parquet"]).done();
     let failed = answer(&["a.parquet", "b.parquet"]).ends(1).stdout;
     for (limit, missing) in [("max-unreadable", 1), ("max-latency", 1), ("max-lost", 2)] {

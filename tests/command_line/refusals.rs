@@ -51,7 +51,7 @@ fn every_damaged_trace_is_refused_by_every_command_that_scores() {
             told.push_str(&message);
             told.push('\n');
         }
-        let checked = run(folder.path(), &with(&["validate"]));
+        let checked = run(folder.path(), &with(&["trace", "validate"]));
         assert_eq!((checked.code, checked.stderr.as_str()), (1, ""), "{case:?}");
         assert!(!checked.stdout.contains("panicked") && checked.stdout.contains(case.last().unwrap()), "{case:?}");
     }
@@ -144,11 +144,11 @@ fn bad_usage_has_a_problem_and_a_remedy() {
             (&["stats", "a.parquet", "--confidence", "95"], &["between 0 and 1", "95"]),
             (&["stats", "a.parquet", "--sequential", "--metric", "TTD"], &["no rate is named `TTD`", "TSA"]),
             (&["stats", "a.parquet", "--sequential", "--horizon", "50"], &["--horizon", "--sequential"]),
-            (&["compare", "a.parquet"], &["--published"]),
-            (&["compare", "a.parquet", "--published", "no.csv"], &["no.csv", "No such file"]),
-            (&["compare", "a.parquet", "--published", "file"], &["file"]),
-            (&["info", "c.parquet"], &["c.parquet", "no such file"]),
-            (&["validate", "c.parquet"], &["c.parquet", "no such file"]),
+            (&["table", "compare", "a.parquet"], &["--published"]),
+            (&["table", "compare", "a.parquet", "--published", "no.csv"], &["no.csv", "No such file"]),
+            (&["table", "compare", "a.parquet", "--published", "file"], &["file"]),
+            (&["trace", "info", "c.parquet"], &["c.parquet", "no such file"]),
+            (&["trace", "validate", "c.parquet"], &["c.parquet", "no such file"]),
             (&["definitions", "check", "cycle.toml"], &["cycle.toml:", "leads back"]),
             (&["definitions", "check", "no.toml"], &["no.toml", "No such file"]),
             (&["definitions", "explain", "TSAA"], &["`TSAA`", "did you mean `TSA`?"]),

@@ -53,8 +53,17 @@ fn write(folder: &Path) {
 fn a_threshold_that_changes_a_conclusion_is_named_in_sentences() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
-    let arguments =
-        ["sensitivity", ".", "--definitions", "chance.toml", "--metrics", "MCR,MGD,TSA", "--thresholds", "1,10,60,101"];
+    let arguments = [
+        "definitions",
+        "sensitivity",
+        ".",
+        "--definitions",
+        "chance.toml",
+        "--metrics",
+        "MCR,MGD,TSA",
+        "--thresholds",
+        "1,10,60,101",
+    ];
     let answer = run(folder.path(), &arguments);
     assert_eq!(answer.stderr, "note: 1 episode was lost without an answer: in no denominator\n");
     assert_shown!(arguments.join(" "), answer.done());
@@ -82,7 +91,8 @@ fn files_are_the_same_for_any_number_of_threads() {
     let out = |threads: &str| {
         let out = folder.path().join(threads);
         let figure = format!("{threads}.svg");
-        let arguments = ["sensitivity", ".", "--threads", threads, "--out", threads, "--figure", &figure, "--json"];
+        let arguments =
+            ["definitions", "sensitivity", ".", "--threads", threads, "--out", threads, "--figure", &figure, "--json"];
         let answer = run(folder.path(), &arguments).done();
         let drawn = fs::read(folder.path().join(figure)).unwrap();
         let files = contents(&out);
@@ -166,7 +176,7 @@ fn definitions_without_a_threshold_are_refused() {
         (&["a.parquet", "--figure", "a.parquet"], &["`parquet`"]),
     ];
     for (arguments, words) in cases {
-        let message = run(folder.path(), &[&["sensitivity"], arguments].concat()).refused();
+        let message = run(folder.path(), &[&["definitions", "sensitivity"], arguments].concat()).refused();
         assert!(words.iter().all(|word| message.contains(word)), "{arguments:?}: {message}");
     }
     let usage = run(folder.path(), &["definitions", "sensitivity", "a.parquet", "--thresholds", "1,0"]).ends(2).stderr;

@@ -22,7 +22,7 @@ fn no_line_is_wider_than_the_terminal() {
         &["report", "a.parquet", "--no-figures", "--style", "paper"],
         &["stats", "a.parquet", "--metric", "all"],
         &["stats", "a.parquet", "--sequential", "--metric", "all"],
-        &["info", "a.parquet"],
+        &["trace", "info", "a.parquet"],
     ] {
         let run = |width: Option<usize>| {
             let mut command = program(folder.path());

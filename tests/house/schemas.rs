@@ -26,7 +26,6 @@ use trace::describe::SchemaDocument;
 use trace::info::Info;
 use trace::labels::LabelLine;
 use trace::log::message::{Decision, EpisodeMessage};
-use trace::renormalize::RenormalizeAnswer;
 use trace::seal::SealAnswer;
 use trace::validate::Validation;
 use world::agent::reply;
@@ -56,7 +55,6 @@ fn current() -> Vec<(&'static str, Value)> {
         ("manifest", printed_schema::<Manifest>()),
         ("plan", json!(schema_for!(Plan))),
         ("plan-register", json!(schema_for!(RegisteredPlan))),
-        ("renormalize", json!(schema_for!(RenormalizeAnswer))),
         ("seal", json!(schema_for!(SealAnswer))),
         ("score-explain", printed_schema::<Evidence>()),
         ("sensitivity", json!(schema_for!(Sensitivity))),

@@ -95,11 +95,6 @@ fn native_matches_worked_examples() {
 }
 
 #[test]
-fn polars_runs_the_sql_of_other_domains() {
-    check(Engine::Polars);
-}
-
-#[test]
 fn duckdb_runs_the_sql_of_other_domains() {
     check(Engine::Duckdb);
 }

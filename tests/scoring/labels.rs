@@ -37,22 +37,19 @@ fn asked(folder: &Path, arguments: &[&str]) -> Answer {
 }
 
 /// The number of episodes that `score` writes under a condition.
-fn count(folder: &Path, condition: &str, more: &[&str]) -> usize {
-    let arguments = [&["score", "runs", "--json", "--metrics", "TSA", "--where", condition], more].concat();
-    asked(folder, &arguments).done().lines().count()
+fn count(folder: &Path, condition: &str) -> usize {
+    asked(folder, &["score", "runs", "--json", "--metrics", "TSA", "--where", condition]).done().lines().count()
 }
 
 #[test]
-fn a_label_is_true_false_or_null_in_filters_of_every_engine() {
+fn a_label_is_true_false_or_null_in_filters() {
     let folder = coded();
     let at = folder.path();
     // Of 14 episodes, Ann labels every second and Bob every third: one in six has both labels.
-    for engine in [&[][..], &["--engine", "polars"]] {
-        assert_eq!(count(at, "label_confabulates", engine), 9);
-        assert_eq!(count(at, "not label_confabulates", engine), 5);
-        assert_eq!(count(at, "label_confabulates is null", engine), 42 - 14);
-        assert_eq!(count(at, "label_confabulates = false and any(mirror_visible) is not null", engine), 5);
-    }
+    assert_eq!(count(at, "label_confabulates"), 9);
+    assert_eq!(count(at, "not label_confabulates"), 5);
+    assert_eq!(count(at, "label_confabulates is null"), 42 - 14);
+    assert_eq!(count(at, "label_confabulates = false and any(mirror_visible) is not null"), 5);
     let refused = asked(at, &["score", "runs", "--where", "label_confabulate"]).refused();
     assert!(refused.contains("did you mean `label_confabulates`?"), "{refused}");
     let refused =
@@ -96,16 +93,9 @@ fn definitions_read_labels() {
         [metric.CONF]\nvalue = \"label_confabulates\"\n[metric.WRONG]\nvalue = \"label_confabulates and not TSA\"\n";
     std::fs::write(at.join("mine.toml"), metric).unwrap();
     asked(at, &["definitions", "check", "mine.toml"]).done();
-    let mut found = Vec::new();
-    for engine in ["native", "polars"] {
-        let rows = asked(
-            at,
-            &["score", "runs", "--json", "--definitions", "mine.toml", "--metrics", "CONF,WRONG", "--engine", engine],
-        );
-        found.push(rows.done());
-    }
-    assert_eq!(found[0], found[1]);
-    let rows: Vec<Value> = found[0].lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let arguments = ["score", "runs", "--json", "--definitions", "mine.toml", "--metrics", "CONF,WRONG"];
+    let rows: Vec<Value> =
+        asked(at, &arguments).done().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let with = |value: Value| rows.iter().filter(|row| row["CONF"] == value).count();
     assert_eq!([with(json!(1)), with(json!(0)), with(Value::Null)], [9, 5, 28]);
     std::fs::remove_file(at.join("runs/labels.jsonl")).unwrap();

@@ -1,4 +1,4 @@
-//! `query` and `--engine polars` at the process boundary.
+//! `query` at the process boundary.
 
 use std::path::Path;
 use std::process::Command;
@@ -157,35 +157,8 @@ fn a_refused_query_comes_with_a_command_line_for_duckdb() {
 }
 
 #[test]
-fn polars_gives_the_bytes_of_the_native_engine() {
-    let scores = |more: &[&str]| {
-        let (code, out, err) = run(&[&["score", FIXTURE][..], more].concat());
-        assert_eq!(code, 0, "{err}");
-        out
-    };
-    assert!(!Path::new(FIXTURE).is_file());
-    for more in [&[][..], &["--where", "seed <> 2 and TSA = 1"], &["--metrics", "TSA,SC"]] {
-        assert_eq!(scores(&[more, &["--engine", "polars"]].concat()), scores(more));
-    }
-}
-
-#[test]
 fn evidence_is_refused_for_another_engine() {
-    let (code, out, err) = run(&["score", FIXTURE, "--engine", "polars", "--explain", "E1/gpt-5-1/s1/r2"]);
+    let (code, out, err) = run(&["score", FIXTURE, "--engine", "spark", "--explain", "E1/gpt-5-1/s1/r2"]);
     assert_eq!((code, out.as_str()), (2, ""));
     assert!(err.contains("--explain shows what the native engine decided by"), "{err}");
-}
-
-#[test]
-fn polars_refuses_damaged_traces_in_the_same_words() {
-    let damaged = std::fs::read_dir("fixtures/damaged").unwrap().map(|entry| entry.unwrap().path());
-    let mut seen = 0;
-    for path in damaged.filter(|path| path.extension().is_some_and(|ending| ending == "parquet")) {
-        let name = path.to_str().unwrap();
-        let (code, _, native) = run(&["score", name]);
-        let (other, _, polars) = run(&["score", name, "--engine", "polars"]);
-        assert_eq!((code, native), (other, polars), "{name}");
-        seen += 1;
-    }
-    assert!(seen > 0);
 }

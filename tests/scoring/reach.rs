@@ -138,11 +138,6 @@ fn native_agrees_with_the_formulas() {
 }
 
 #[test]
-fn polars_agrees_with_the_formulas() {
-    check(Engine::Polars);
-}
-
-#[test]
 fn duckdb_agrees_with_the_formulas() {
     check(Engine::Duckdb);
 }
@@ -196,11 +191,6 @@ fn check_fallback(engine: Engine) {
 #[test]
 fn the_last_number_counts_only_in_answers_that_were_not_read() {
     check_fallback(Engine::Native);
-}
-
-#[test]
-fn polars_parses_the_same_last_numbers() {
-    check_fallback(Engine::Polars);
 }
 
 #[test]

@@ -61,7 +61,7 @@ fn every_code_of_damage_has_its_file() {
 fn validate_names_the_damage() {
     for (case, files) in cases() {
         let mut command = program(&folder());
-        let answer = answer(command.args(["validate", "--json"]).args(files.iter().map(|(name, _)| name)));
+        let answer = answer(command.args(["trace", "validate", "--json"]).args(files.iter().map(|(name, _)| name)));
         let report: serde_json::Value = serde_json::from_str(&answer.stdout).unwrap();
         let code = &files[0].1;
         assert_eq!((answer.code, answer.stderr.as_str()), (1, ""), "{case}");
@@ -103,7 +103,7 @@ fn a_scan_refuses_all_of_them() {
 #[test]
 fn one_damaged_file_does_not_hide_the_others() {
     let files = ["truncated.parquet", "t-gap.parquet", "empty.parquet"];
-    let answer = run(&folder(), &[&["validate", "--json"][..], &files].concat());
+    let answer = run(&folder(), &[&["trace", "validate", "--json"][..], &files].concat());
     let report: serde_json::Value = serde_json::from_str(&answer.stdout).unwrap();
     let findings = report["findings"].as_array().unwrap();
     let pairs: Vec<_> = findings.iter().map(|f| (f["file"].as_str().unwrap(), f["code"].as_str().unwrap())).collect();

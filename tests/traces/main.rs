@@ -5,7 +5,6 @@ mod foreign;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod import;
-mod renormalize;
 mod trace_bytes;
 mod trace_commands;
 mod trace_scan;

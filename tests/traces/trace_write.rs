@@ -1,17 +1,10 @@
 //! The writer: its output, its refusals, and files that appear whole or not at all.
 
 use std::fs;
-use std::num::NonZeroUsize;
-use std::sync::Arc;
 
-use arrow::array::{Int64Array, RecordBatch};
-use arrow::datatypes::{DataType, Field, Schema};
-use metric::definitions::Definitions;
 use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use score::score_traces;
-use score::vocabulary;
 use trace::episode::{Action, Episode, Extra, Step};
 use trace::inputs::Input;
 use trace::merge;
@@ -173,45 +166,18 @@ fn a_file_appears_when_it_is_finished() {
 }
 
 #[test]
-fn a_trace_is_of_the_oldest_version_that_has_its_columns() {
+fn another_schema_version_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let version = |name: &str, condition: Option<&str>| {
-        let path = folder.path().join(name);
-        let named = Episode { condition: condition.map(str::to_owned), ..episode("a", 1) };
-        write_episodes(&path, None, &[named]).unwrap();
-        let set = TraceSet::open(&[Input::new(&path)]).unwrap();
-        set.files()[0].metadata_value("mirrorstats.schema_version").map(str::to_owned)
-    };
-    assert_eq!(version("old.parquet", None).as_deref(), Some("1"));
-    assert_eq!(version("new.parquet", Some("near")).as_deref(), Some("2"));
-}
-
-#[test]
-fn a_column_name_new_in_version_2_stays_custom_in_version_1() {
-    let folder = tempfile::tempdir().unwrap();
-    // It is neither constant in an episode nor text, as the schema's column would be.
-    let own = |version: &str| {
-        let path = folder.path().join(format!("{version}.parquet"));
-        let plain = folder.path().join("plain.parquet");
-        write_episodes(&plain, None, &[episode("a", 2)]).unwrap();
-        let rows = traces::rows(&plain);
-        let mut fields: Vec<_> = rows.schema().fields().iter().cloned().collect();
-        fields.push(Arc::new(Field::new("condition", DataType::Int64, true)));
-        let mut columns = rows.columns().to_vec();
-        columns.push(Arc::new(Int64Array::from(vec![1, 2])));
-        let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).unwrap();
+    let plain = folder.path().join("plain.parquet");
+    write_episodes(&plain, None, &[episode("a", 2)]).unwrap();
+    let set = TraceSet::open(&[Input::new(&plain)]).unwrap();
+    assert_eq!(set.files()[0].metadata_value("mirrorstats.schema_version"), Some("2"));
+    for (version, code) in [("1", "invalid-metadata"), ("0", "invalid-metadata"), ("3", "newer-schema")] {
+        let path = folder.path().join("other.parquet");
         let pair = KeyValue::new("mirrorstats.schema_version".to_owned(), version.to_owned());
         let properties = WriterProperties::builder().set_key_value_metadata(Some(vec![pair])).build();
-        traces::write_rows(&path, &[batch], Some(properties));
-        TraceSet::open(&[Input::new(&path)])
-    };
-    let old = own("1").unwrap();
-    assert!(!old.declares("condition"));
-    let definitions = "open = true\n[metric.X]\nvalue = \"sum(condition)\"\n";
-    let columns = vocabulary::trace_columns(&old);
-    let definitions = Definitions::from_toml("own", definitions, &columns).unwrap();
-    let table = score_traces::score(&old, &definitions, &[], NonZeroUsize::MIN).unwrap();
-    assert_eq!(table.metrics[0].get(0), Some(3));
-    let error = own("2").unwrap_err().to_string();
-    assert!(error.contains("wrong-type") && error.contains("condition"), "{error}");
+        traces::write_rows(&path, &[traces::rows(&plain)], Some(properties));
+        let error = TraceSet::open(&[Input::new(&path)]).unwrap_err().to_string();
+        assert!(error.contains(code) && error.contains("expected schema version 2"), "{error}");
+    }
 }

@@ -1,7 +1,6 @@
-//! Other engines that run the SQL lowering of a plan: Polars in this process, Spark on a cluster.
+//! Other engines: Polars in this process for queries over traces, Spark on a cluster for scores.
 //!
-//! Rule: an engine returns the same [`EpisodeTable`](score::table::EpisodeTable) as the native one, or an error; never
-//! a different table.
+//! Rule: an engine returns what the native one would, or an error; never a different table.
 //!
 //! ```
 //! use mirrorstats_engines::spark::setting::Setting;

@@ -50,7 +50,6 @@ pub struct Columns {
     schema: IndexMap<String, Column>,
     own: IndexMap<String, Column>,
     fallbacks: IndexMap<String, Fallback>,
-    free: Vec<String>,
     values: IndexMap<String, Vec<String>>,
     /// Columns of the schema that have a meaning only in the domain of the mirror.
     of_mirror: Vec<String>,
@@ -115,12 +114,7 @@ impl Columns {
     }
 
     pub(crate) fn is_reserved(&self, name: &str) -> bool {
-        self.schema.contains_key(name) && !self.free.iter().any(|free| free == name)
-    }
-
-    /// Lets definitions use the name of a column of the schema for other things.
-    pub fn set_free(&mut self, name: impl Into<String>) {
-        self.free.push(name.into());
+        self.schema.contains_key(name)
     }
 
     /// Removes a column from the schema: these traces use its name for something else.

@@ -43,4 +43,4 @@ mod tests;
 use catalogs::measure;
 pub use catalogs::{catalog, relations, restore};
 
-pub use logical_plan::{explain, overflow, plan};
+pub use logical_plan::{explain, plan};

@@ -17,7 +17,6 @@ pub(crate) fn schema_columns() -> Columns {
             columns.set_fallback(column.name, Fallback { expression, is_read: column.required });
         }
     }
-    COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
     columns
 }
 

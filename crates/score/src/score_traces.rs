@@ -183,21 +183,6 @@ pub(super) fn header(definitions: &Definitions, labels: &[String]) -> Header {
     Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics }
 }
 
-/// The episodes of some traces without metrics: keys and labels. The traces are checked as in [`score`]. For engines
-/// that read the traces themselves and check nothing.
-pub fn unscored(
-    traces: &TraceSet,
-    definitions: &Definitions,
-    labels: &[String],
-    threads: NonZeroUsize,
-) -> Result<EpisodeTable, ScoreError> {
-    let projection = projection(traces, &[definitions], &PhysicalPlan::of(&[&definitions.plan]), labels)?;
-    let header = Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics: Vec::new() };
-    let nothing = |_: &EpisodeBatch| Ok((vec![BatchScores { kept: None, metrics: Vec::new() }], ()));
-    let mut tables = collect(traces, &projection, vec![header], threads, nothing, |()| {})?;
-    Ok(tables.pop().expect("a table per header"))
-}
-
 /// The tables that `score` gives for each batch; its other output goes to `other`, in the order of the files.
 pub(super) fn collect<T: Send>(
     traces: &TraceSet,

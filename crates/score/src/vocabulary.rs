@@ -21,7 +21,6 @@ pub fn schema_columns() -> Columns {
     let mut columns = columns.with_values(lists).with_mirror(of_mirror);
     // A trace without a required column is an exception that its experiment declares.
     set_fallbacks(&mut columns, |name| schema::column(name).is_some_and(|known| known.required));
-    COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
     columns
 }
 
@@ -137,10 +136,10 @@ pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
         return Ok(());
     }
     let problem = column_problem(traces, label);
-    // Columns of version 2 are null in older traces, or have a meaning for missing values.
+    // Optional columns are null in traces without them, or have a meaning for missing values.
     let is_known_anyway = traces.domain().column(label).is_some_and(|known| {
         let found = traces.column(label);
-        known.default_text().is_some() || known.since > 1 && found.is_some_and(|found| found.conflict.is_none())
+        known.default_text().is_some() || !known.required && found.is_some_and(|found| found.conflict.is_none())
     });
     // Reading shows whether an own column varies between steps.
     let is_constant = |name: &str| match traces.domain() {

@@ -1,7 +1,6 @@
-//! The scoring backend: the native kernels, or the SQL lowering on another engine. The results are the same.
+//! The scoring backend: the native kernels, or the SQL lowering on Spark. The results are the same.
 
 use std::ffi::OsString;
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use super::error::StudyError;
@@ -12,15 +11,12 @@ use exact::replace::check_target;
 use metric::definitions::Definitions;
 use score::table::EpisodeTable;
 use score::vocabulary::check_label;
-use trace::open::TraceSet;
 
 #[derive(Clone, Debug, Default)]
 pub enum Backend {
     /// The native kernels.
     #[default]
     Native,
-    /// The SQL lowering on Polars, in this process; an error in a build without Polars.
-    Polars,
     /// The SQL lowering on the user's own Spark.
     Spark(Cluster),
 }
@@ -88,19 +84,4 @@ pub fn are_uris(arguments: &[OsString]) -> Result<bool, StudyError> {
         all if all == arguments.len() => Ok(true),
         _ => Err(StudyError::FilesAndUris),
     }
-}
-
-#[cfg(feature = "polars")]
-pub(super) fn polars(
-    traces: &TraceSet,
-    question: &Question,
-    threads: NonZeroUsize,
-) -> Result<EpisodeTable, StudyError> {
-    let definitions = question.bind(traces)?;
-    Ok(engines::polars::score::score(traces, &definitions, &question.labels_over(traces), threads)?)
-}
-
-#[cfg(not(feature = "polars"))]
-pub(super) fn polars(_: &TraceSet, _: &Question, _: NonZeroUsize) -> Result<EpisodeTable, StudyError> {
-    Err(StudyError::WithoutPolars { what: "--engine polars" })
 }

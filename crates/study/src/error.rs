@@ -157,10 +157,10 @@ pub enum StudyError {
     )]
     StyleGone { name: String, expected: String },
     #[error(
-        "`{what}` needs Polars, which this build lacks\n  \
+        "`query` needs Polars, which this build lacks\n  \
          help: build with it: cargo build --release --features polars"
     )]
-    WithoutPolars { what: &'static str },
+    WithoutPolars,
     #[error("--palette {typed}: {words}")]
     Palette { typed: String, words: String },
     #[error(transparent)]
@@ -224,12 +224,11 @@ impl StudyError {
     /// The faults of definitions or of a filter, which are printed with the source underlined.
     pub fn faults(&self) -> Option<&Faults> {
         match self {
-            Self::Filter(faults) | Self::Select(SelectError::Condition(faults)) => Some(faults),
+            Self::Filter(faults)
+            | Self::Select(SelectError::Condition(faults))
+            | Self::Style(StyleError::Faults(faults)) => Some(faults),
             Self::Definitions(error) => faults_of_file(error),
-            Self::Style(StyleError::Faults(faults)) => Some(faults),
             Self::Score(error) | Self::Evidence(EvidenceError::Score(error)) => faults_of_scoring(error),
-            #[cfg(feature = "polars")]
-            Self::Polars(engines::polars::run::PolarsError::Score(error)) => faults_of_scoring(error),
             _ => None,
         }
     }

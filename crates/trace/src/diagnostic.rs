@@ -98,9 +98,9 @@ codes! {
         "if you trust the file, the environment variable MIRRORSTATS_BUDGET=10 allows ten times as much of everything";
     /// The footer's metadata of mirrorstats cannot be read.
     InvalidMetadata, Error, "invalid-metadata":
-        "`mirrorstats.schema_version` is a whole number from 1; `mirrorstats.checksums` has one of each column chunk; in `mirrorstats.recording` a `palette` lists colours, and an \
+        "`mirrorstats.schema_version` is the version of this program's schema; `mirrorstats.checksums` has one of each column chunk; in `mirrorstats.recording` a `palette` lists colours, and an \
          `experiment` is spelled as in a definition file, in all files alike",
-        "correct or remove that key in the footer; a file without it is read as the newest version";
+        "correct or remove that key in the footer; a file without a schema version is read as that of another writer";
     /// The file was written under a newer schema.
     NewerSchema, Error, "newer-schema":
         "the schema version is one that this program knows", "update mirrorstats to read this file";

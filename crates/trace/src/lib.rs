@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `schema` | the columns, their allowed values, and their fields in an episode |
 //! | `read` | from bytes to complete episodes: footers, pages, columns, one pass on several threads |
-//! | `write` | from episodes to bytes: new traces, merged traces, traces with one new column or new attributions |
+//! | `write` | from episodes to bytes: new traces, merged traces, sealed copies |
 //! | `validate` | the rules for complete episodes, alone and together |
 //! | `import` | from JSON lines to a trace |
 //! | `log` | MCAP logs of recordings: written, read, recovered |
@@ -42,7 +42,6 @@ mod read;
 pub mod renderer;
 pub mod scan;
 pub mod schema;
-pub mod seal;
 pub mod validate;
 pub mod write;
 
@@ -53,4 +52,4 @@ pub use footers::{answered, checksums, declared, declared_experiment};
 pub use read::flat::{FlatRows, TableFile};
 pub use read::{in_order, open, search, steps, verify};
 pub use schema::{colors, describe};
-pub use write::{merge, renormalize};
+pub use write::{merge, seal};

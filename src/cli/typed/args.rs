@@ -83,9 +83,7 @@ pub enum Engine {
     /// The program's own kernels
     #[default]
     Native,
-    /// The SQL statement of `mirrorstats definitions sql` on Polars, in this process
-    Polars,
-    /// The same statement on your own Spark: `SPARK_HOME`, `spark-submit` on PATH, or Python's package `pyspark`
+    /// The SQL statement of `mirrorstats definitions sql` on your own Spark: `SPARK_HOME`, `spark-submit` on PATH, or Python's package `pyspark`
     Spark,
 }
 

@@ -52,7 +52,6 @@ impl EngineArgs {
         self.check()?;
         Ok(match self.engine {
             Engine::Native => Backend::Native,
-            Engine::Polars => Backend::Polars,
             Engine::Spark => Backend::Spark(self.cluster()),
         })
     }

@@ -217,7 +217,7 @@ fn an_answer_by_another_model_stops_the_recording_before_the_second_request() {
     let recording = traces::recording(&folder.path().join(trace));
     assert_eq!(recording["agent"]["accepted_models"], json!([OTHER]));
     let note = format!("note: another model answered in {trace}: asked for `gemini-2.5-pro`, found `{OTHER}`\n");
-    for words in [&["info", "runs"][..], &["validate", "runs"], &["report", "runs", "--no-figures"]] {
+    for words in [&["trace", "info", "runs"][..], &["trace", "validate", "runs"], &["report", "runs", "--no-figures"]] {
         let answer = run(folder.path(), words).ends(0);
         assert_eq!(answer.stderr.matches(&note).count(), 1, "{words:?}: {}", answer.stderr);
     }

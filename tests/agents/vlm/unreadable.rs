@@ -19,7 +19,7 @@ fn short() -> Folder {
 
 /// The output of a command on the traces in `runs`, as text and as JSON.
 fn told(folder: &Folder, verb: &str) -> (String, Value) {
-    (run(folder.path(), &[verb, "runs"]).done(), run(folder.path(), &[verb, "runs", "--json"]).json())
+    (run(folder.path(), &["trace", verb, "runs"]).done(), run(folder.path(), &["trace", verb, "runs", "--json"]).json())
 }
 
 #[test]

@@ -42,7 +42,7 @@ fn start(home: &Path, at: usize, draws: &mut Draws) -> Started {
         let words = [
             format!("score runs -o s{at}.csv"),
             format!("report runs --no-figures --out r{at}"),
-            "info runs".to_owned(),
+            "trace info runs".to_owned(),
             "view runs --no-open --port 0".to_owned(),
         ];
         let which = draws.below(if cfg!(feature = "view") { 4 } else { 3 });

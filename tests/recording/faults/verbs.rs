@@ -38,21 +38,18 @@ const VERBS: &[Verb] = &[
     verb("report b.parquet --no-figures --out rep", "report in --no-figures --out rep", &["rep"]),
     verb("", "report in --no-figures --out new/deep/rep", &["new/deep/rep"]),
     verb("report b.parquet --no-figures --out link", "report in --no-figures --out link", &["link"]),
-    verb("report b.parquet --no-figures --out r2", "rescore r1 --definitions extended --out r2", &["r2"]),
+    verb("report b.parquet --no-figures --out r2", "table rescore r1 --definitions extended --out r2", &["r2"]),
     verb("import b.jsonl -o i.parquet", "import a.jsonl -o i.parquet", &["i.parquet"]),
-    verb("renormalize b.parquet --out norm", "renormalize old/a.parquet old/b.parquet --out norm", &["norm"]),
-    verb("", "renormalize old --out new/norm", &["new/norm"]),
-    verb("renormalize b.parquet --out link", "renormalize old/a.parquet old/b.parquet --out link", &["link"]),
     verb("trace seal b.parquet sealed.parquet", "trace seal a.parquet sealed.parquet", &["sealed.parquet"]),
-    verb("renormalize b.parquet --out man", "man man", &["man"]),
-    verb("score b.parquet -o rec.parquet", "recover a.mcap -o rec.parquet", &["rec.parquet"]),
+    verb("definitions sensitivity b.parquet --out man", "setup man man", &["man"]),
+    verb("score b.parquet -o rec.parquet", "trace recover a.mcap -o rec.parquet", &["rec.parquet"]),
     verb("figure spider b.parquet -o f.svg", "figure spider a.parquet -o f.svg", &["f.svg"]),
     verb("", "plan --episodes 21 --register p.json", &["p.json"]),
-    verb("sensitivity b.parquet --out sens", "sensitivity a.parquet --out sens", &["sens"]),
-    verb("sensitivity b.parquet --out link", "sensitivity a.parquet --out link", &["link"]),
+    verb("definitions sensitivity b.parquet --out sens", "definitions sensitivity a.parquet --out sens", &["sens"]),
+    verb("definitions sensitivity b.parquet --out link", "definitions sensitivity a.parquet --out link", &["link"]),
     verb(
-        "replay b.parquet --recompute-visibility -o v.parquet",
-        "replay a.parquet --recompute-visibility -o v.parquet",
+        "world replay b.parquet --recompute-visibility -o v.parquet",
+        "world replay a.parquet --recompute-visibility -o v.parquet",
         &["v.parquet"],
     ),
     #[cfg(feature = "view")]
@@ -90,10 +87,6 @@ fn prepared() -> TempDir {
     fs::write(path.join("in/lost.jsonl"), format!("{lost}\n")).unwrap();
     run(path, &["report", "a.parquet", "--no-figures", "--out", "r1"]).done();
     // Like `a` and `b`, but with attributions that will change.
-    fs::create_dir(path.join("old")).unwrap();
-    for name in ["a", "b"] {
-        fs::copy(path.join(format!("{name}.parquet")), path.join(format!("old/{name}.parquet"))).unwrap();
-    }
     fs::create_dir(path.join("there")).unwrap();
     std::os::unix::fs::symlink("there", path.join("link")).unwrap();
     folder
@@ -230,12 +223,12 @@ fn check_memory(most: usize) {
     let ended = AtomicUsize::new(0);
     let tried = AtomicUsize::new(0);
     // MuJoCo ends the process by itself if memory is refused to it.
-    let verbs: Vec<&Verb> = VERBS.iter().filter(|verb| !verb.words.starts_with("replay")).collect();
+    let verbs: Vec<&Verb> = VERBS.iter().filter(|verb| !verb.words.starts_with("world replay")).collect();
     all_at_once(&verbs, |verb| {
         let case = Case::new(prepared.path(), verb);
         let mut rounds: Vec<usize> = (1..=case.allocations()).collect();
         // Two allocations of its decoder, refused, once looked like a damaged chunk.
-        if !verb.words.starts_with("recover") {
+        if !verb.words.starts_with("trace recover") {
             sample(&mut rounds, most);
         }
         tried.fetch_add(rounds.len(), Ordering::Relaxed);
@@ -261,8 +254,8 @@ fn soak_refused_memory_leaves_old_or_new_outputs() {
 fn command(home: &Path, words: &str) -> Command {
     let mut command = typed(home, words);
     // With one thread the calls are the same each time.
-    if ["score", "report", "rescore", "sensitivity", "renormalize", "view"].contains(&words.split(' ').next().unwrap())
-    {
+    let scanning = ["score", "report", "table rescore", "definitions sensitivity", "view"];
+    if scanning.iter().any(|verb| words.starts_with(verb)) {
         command.args(["--threads", "1"]);
     }
     command

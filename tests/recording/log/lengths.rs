@@ -188,7 +188,7 @@ fn check_recover(stride: usize) {
     let logs = fields_of(&RECORDING.log).into_iter().flat_map(|field| damaged(&RECORDING.log, field));
     for (what, bytes) in logs.step_by(stride) {
         fs::write(folder.path().join("log.mcap"), bytes).unwrap();
-        let output = limited(folder.path(), "recover log.mcap -o trace.parquet");
+        let output = limited(folder.path(), "trace recover log.mcap -o trace.parquet");
         assert_eq!(output.status.code(), Some(3), "{what}: {}", stderr(&output));
         assert_eq!(stderr(&output), "", "{what}");
         drop(fs::remove_file(folder.path().join("trace.parquet")));

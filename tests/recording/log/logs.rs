@@ -94,7 +94,7 @@ impl Desk {
         drop(fs::remove_file(self.trace()));
         fs::write(self.0.path().join("cut.mcap"), bytes).unwrap();
         let mut command = program(self.0.path());
-        command.args(["recover", "cut.mcap", "-o", "trace.parquet"]).args(more);
+        command.args(["trace", "recover", "cut.mcap", "-o", "trace.parquet"]).args(more);
         command.output().unwrap()
     }
 

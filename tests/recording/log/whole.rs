@@ -81,8 +81,8 @@ fn a_missing_log_and_an_unwritable_output_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("whole.mcap"), &RECORDING.log).unwrap();
     for (words, expected) in [
-        (["recover", "none.mcap", "-o", "trace.parquet"], "cannot open the log `none.mcap`"),
-        (["recover", "whole.mcap", "-o", "none/trace.parquet"], "none/trace.parquet"),
+        (["trace", "recover", "none.mcap", "-o", "trace.parquet"], "cannot open the log `none.mcap`"),
+        (["trace", "recover", "whole.mcap", "-o", "none/trace.parquet"], "none/trace.parquet"),
     ] {
         let said = run(folder.path(), &words).refused();
         assert!(said.contains(expected), "{said}");

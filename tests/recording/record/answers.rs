@@ -77,7 +77,7 @@ fn answers_that_contradict_the_declaration_are_reported() {
     let mut all = recorded(&bench);
     let folder = bench.folder.path();
     run(folder, &["trace", "validate", "runs"]).done();
-    run(folder, &["replay", "runs"]).done();
+    run(folder, &["world", "replay", "runs"]).done();
     // The log alone gives the same rows.
     run(folder, &["trace", "recover", "runs/mine-random@crowd.mcap", "--out", "again.parquet"]).done();
     assert_eq!(episodes(&bench.path("again.parquet")), all);
@@ -100,7 +100,7 @@ fn answers_that_contradict_the_declaration_are_reported() {
     all[0].steps[0].extra.answers.insert("answer_side".to_owned(), text("left"));
     all[0].steps[0].extra.answers.insert("truth_count".to_owned(), Answered::Number(2.0));
     write("altered.parquet", &all);
-    let said = run(folder, &["replay", "altered.parquet"]).ends(1);
+    let said = run(folder, &["world", "replay", "altered.parquet"]).ends(1);
     let said = said.stdout + &said.stderr;
     assert!(said.contains("truth_count"), "{said}");
     // A value for an undeclared answer is refused, not dropped.

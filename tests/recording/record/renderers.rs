@@ -52,7 +52,7 @@ fn two_renderers_are_told_apart_everywhere() {
     let steps: usize = episodes(&bench.path("one/E1-mimic.parquet")).iter().map(|episode| episode.steps.len()).sum();
     let replay = |command: Command| {
         let mut command = command;
-        answer(command.args(["replay", "one/E1-mimic.parquet", "--json"])).json()["frames"].clone()
+        answer(command.args(["world", "replay", "one/E1-mimic.parquet", "--json"])).json()["frames"].clone()
     };
     let same = replay(program(folder));
     assert_eq!((&same["equal"], &same["alike"], &same["different"]), (&steps.into(), &0.into(), &0.into()));
@@ -78,13 +78,13 @@ fn a_frame_with_other_contents_is_reported_as_different() {
     let mut writer = TraceWriter::create(&path, &TraceMetadata { recording: Some(footer), columns }).unwrap();
     writer.write(&all[0]).unwrap();
     writer.finish().unwrap();
-    let replayed = run(bench.folder.path(), &["replay", "runs/E1-mimic.parquet"]).ends(1);
+    let replayed = run(bench.folder.path(), &["world", "replay", "runs/E1-mimic.parquet"]).ends(1);
     let said = &replayed.stdout;
     assert!(
         said.contains("E1/mimic/s1/r1, t = 2: frame_digest: recorded ") && said.contains(", 1 different"),
         "{said}"
     );
-    let replayed = run(bench.folder.path(), &["replay", "runs/E1-mimic.parquet", "--skip-frames"]).done();
+    let replayed = run(bench.folder.path(), &["world", "replay", "runs/E1-mimic.parquet", "--skip-frames"]).done();
     assert!(replayed.contains("all match") && !replayed.contains("frames:"), "{replayed}");
 }
 

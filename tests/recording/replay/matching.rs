@@ -14,7 +14,7 @@ fn every_step_matches() {
         .flat_map(|experiment| episodes(&recorded(experiment)))
         .map(|episode| episode.steps.len())
         .sum();
-    let answer = run(&RECORDED, &["replay", ".", "--json"]).json();
+    let answer = run(&RECORDED, &["world", "replay", ".", "--json"]).json();
     assert_eq!(answer["episodes"], 12);
     assert_eq!(answer["steps"], steps);
     assert_eq!(answer["divergences"].as_array().map(Vec::len), Some(0));
@@ -35,7 +35,7 @@ fn one_episode_can_be_replayed() {
 
 #[test]
 fn the_bundled_recordings_match() {
-    let said = run(&fixture("recorded"), &["replay", "E1-guesser.parquet", "E5-random.parquet"]).done();
+    let said = run(&fixture("recorded"), &["world", "replay", "E1-guesser.parquet", "E5-random.parquet"]).done();
     assert!(said.contains("all match"), "{said}");
 }
 

@@ -41,7 +41,7 @@ fn a_frame_does_not_replace_the_trace() {
     let path = folder.path().join(id).join("t001.png");
     fs::create_dir(path.parent().unwrap()).unwrap();
     fs::copy(recorded("E1"), &path).unwrap();
-    let output = program(folder.path()).arg("replay").arg(&path).args(["--frames", "."]).output().unwrap();
+    let output = program(folder.path()).args(["world", "replay"]).arg(&path).args(["--frames", "."]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("expected another file to write"), "{}", stderr(&output));
     assert!(fs::read(&path).unwrap() == fs::read(recorded("E1")).unwrap());
@@ -58,7 +58,7 @@ fn a_film_strip_does_not_replace_its_log_or_trace() {
         let before = fs::read(&path).unwrap();
         let (input, out) = (format!("a.{ending}"), format!("{ending}.svg"));
         let mut command = program(folder.path());
-        let output = command.args(["filmstrip", "E1/guesser/s1/r1", &input, "--out", &out]).output().unwrap();
+        let output = command.args(["world", "filmstrip", "E1/guesser/s1/r1", &input, "--out", &out]).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{ending}");
         assert!(stderr(&output).contains("expected another file to write"), "{}", stderr(&output));
         assert!(fs::read(&path).unwrap() == before);
@@ -73,7 +73,7 @@ fn a_log_is_not_replaced_by_the_trace_that_it_gives() {
     symlink("a.mcap", folder.path().join("a.parquet")).unwrap();
     let before = fs::read(&log).unwrap();
     for out in ["a.mcap", "./a.mcap", "a.parquet"] {
-        let output = program(folder.path()).args(["recover", "a.mcap", "--out", out]).output().unwrap();
+        let output = program(folder.path()).args(["trace", "recover", "a.mcap", "--out", out]).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{out}");
         assert!(stderr(&output).contains("expected another file to write"), "{}", stderr(&output));
         assert!(fs::read(&log).unwrap() == before, "{out}");
@@ -94,7 +94,7 @@ fn one_episode_does_not_take_the_place_of_a_log_with_others() {
     let folder = with_log();
     let log = folder.path().join("E1-random.mcap");
     let before = fs::read(&log).unwrap();
-    let words = ["replay", "E1-random.parquet", "--episode", "E1/random/s1/r2", "--mcap"];
+    let words = ["world", "replay", "E1-random.parquet", "--episode", "E1/random/s1/r2", "--mcap"];
     for (name, found) in [("E1-random.mcap", "one with the episode `E1/random/s1/r1`"), ("cut", "cannot be read")] {
         fs::write(folder.path().join("cut"), &before[..before.len() / 3]).unwrap();
         let old = fs::read(folder.path().join(name)).unwrap();
@@ -106,9 +106,9 @@ fn one_episode_does_not_take_the_place_of_a_log_with_others() {
     }
     // A replay may replace a log of the same episode; a replay of all may replace the whole log.
     need::drawing();
-    for (words, count) in [(&words[..], 1), (&words, 1), (&["replay", "E1-random.parquet", "--mcap"], 2)] {
+    for (words, count) in [(&words[..], 1), (&words, 1), (&["world", "replay", "E1-random.parquet", "--mcap"], 2)] {
         succeeds(program(folder.path()).args(words).arg("again.mcap"));
-        succeeds(program(folder.path()).args(["recover", "again.mcap", "--out", "again.parquet"]));
+        succeeds(program(folder.path()).args(["trace", "recover", "again.mcap", "--out", "again.parquet"]));
         assert_eq!(episodes(&folder.path().join("again.parquet")).len(), count);
     }
 }
@@ -118,7 +118,7 @@ fn one_episode_does_not_take_the_place_of_a_log_with_others() {
 fn replay_within(folder: &Path, bytes: usize, is_ignored: bool) -> Output {
     let ignored = if is_ignored { "trap '' XFSZ; " } else { "" };
     let mut command = limited(folder, &format!("{ignored}ulimit -f {}", bytes / 512));
-    command.arg("replay").arg(recorded("E1")).args(["--mcap", "again.mcap"]).output().unwrap()
+    command.args(["world", "replay"]).arg(recorded("E1")).args(["--mcap", "again.mcap"]).output().unwrap()
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn an_old_log_stays_where_there_is_no_room_for_the_new_one() {
     let folder = tempfile::tempdir().unwrap();
     let words = ["--mcap", "again.mcap"];
     need::drawing();
-    succeeds(program(folder.path()).arg("replay").arg(recorded("E1")).args(words));
+    succeeds(program(folder.path()).args(["world", "replay"]).arg(recorded("E1")).args(words));
     let log = folder.path().join("again.mcap");
     let whole = fs::read(&log).unwrap();
     // There is room for each episode's own log, but not for the log of all three.
@@ -138,7 +138,7 @@ fn an_old_log_stays_where_there_is_no_room_for_the_new_one() {
         assert!(stderr(&output).contains("cannot write the log `again.mcap`"), "{}", stderr(&output));
         assert!(fs::read(&log).unwrap() == old, "the old log has changed");
     }
-    succeeds(program(folder.path()).arg("replay").arg(recorded("E1")).args(words));
+    succeeds(program(folder.path()).args(["world", "replay"]).arg(recorded("E1")).args(words));
     assert!(fs::read(&log).unwrap() == whole, "the new log is not in place of the old one");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "something is left over");
 }

@@ -14,7 +14,7 @@ fn a_replay_writes_frames_and_a_log() {
     let folder = tempfile::tempdir().unwrap();
     need::drawing();
     let mut command = program(folder.path());
-    command.arg("replay").arg(recorded("E1")).args(["--frames", "frames", "--mcap", "again.mcap"]);
+    command.args(["world", "replay"]).arg(recorded("E1")).args(["--frames", "frames", "--mcap", "again.mcap"]);
     succeeds(&mut command);
     for episode in episodes(&recorded("E1")) {
         let name = episode.episode_id.replace('/', "-");
@@ -26,7 +26,7 @@ fn a_replay_writes_frames_and_a_log() {
         assert_eq!(count, episode.steps.len());
     }
     // The log contains the whole trace.
-    succeeds(program(folder.path()).args(["recover", "again.mcap", "-o", "again.parquet"]));
+    succeeds(program(folder.path()).args(["trace", "recover", "again.mcap", "-o", "again.parquet"]));
     let again = fs::read(folder.path().join("again.parquet")).unwrap();
     assert!(again == fs::read(recorded("E1")).unwrap(), "the trace of the log has other bytes");
 }
@@ -38,7 +38,7 @@ fn the_log_that_is_there_stays_if_the_new_one_cannot_be_written() {
     let log = folder.path().join("again.mcap");
     let replay = |blocks: &str| {
         let mut command = limited(folder.path(), &format!("trap '' XFSZ; ulimit -f {blocks}"));
-        command.arg("replay").arg(recorded("E1")).args(["--mcap", "again.mcap"]).output().unwrap()
+        command.args(["world", "replay"]).arg(recorded("E1")).args(["--mcap", "again.mcap"]).output().unwrap()
     };
     need::drawing();
     let output = replay("unlimited");
@@ -63,7 +63,7 @@ fn a_film_strip_is_the_same_from_the_log_and_from_the_trace() {
     succeeds(&mut typed(folder.path(), words));
     let drawn = |source: &str, name: &str, more: &[&str]| {
         let mut command = program(folder.path());
-        command.args(["filmstrip", "E3/random/s1/r2", source, "--out", name]).args(more);
+        command.args(["world", "filmstrip", "E3/random/s1/r2", source, "--out", name]).args(more);
         succeeds(&mut command);
         fs::read(folder.path().join(name)).unwrap()
     };
@@ -78,7 +78,7 @@ fn a_film_strip_is_the_same_from_the_log_and_from_the_trace() {
 /// The film strip of the bundled log's episode.
 fn strip(folder: &Path, more: &[&str]) -> String {
     let mut command = program(folder);
-    command.args(["filmstrip", "E1/guesser/s1/r1"]).arg(fixture("recorded/E1-guesser.mcap"));
+    command.args(["world", "filmstrip", "E1/guesser/s1/r1"]).arg(fixture("recorded/E1-guesser.mcap"));
     succeeds(command.args(["--out", "strip.svg"]).args(more));
     fs::read_to_string(folder.join("strip.svg")).unwrap()
 }
@@ -120,7 +120,7 @@ fn an_impossible_film_strip_is_refused_and_leaves_no_file() {
         ("E1/guesser/s1/r1", &log, &["--out", "none/a.svg"], "none/a.svg"),
         ("E1/guesser/s1/r1", "none.mcap", &["--out", "a.svg"], "none.mcap"),
     ] {
-        let output = program(folder.path()).args(["filmstrip", episode, source]).args(words).output().unwrap();
+        let output = program(folder.path()).args(["world", "filmstrip", episode, source]).args(words).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{words:?}");
         assert!(stderr(&output).contains(expected), "{words:?}: {}", stderr(&output));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "{words:?}");

@@ -12,7 +12,7 @@ fn recounted(words: &[&str]) -> (tempfile::TempDir, std::path::PathBuf) {
     let out = folder.path().join("anew.parquet");
     let mut command = program(folder.path());
     command
-        .arg("replay")
+        .args(["world", "replay"])
         .arg(WITH_SIGHT.as_path())
         .args(["--recompute-visibility", "--out", "anew.parquet"])
         .args(words);
@@ -48,7 +48,7 @@ fn another_threshold_agrees_with_the_recorded_counts() {
 fn a_replay_has_a_limit_of_rays() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = program(folder.path());
-    command.args(["replay", "--recompute-visibility", "--grid", "4000x4000", "--out", "anew.parquet"]);
+    command.args(["world", "replay", "--recompute-visibility", "--grid", "4000x4000", "--out", "anew.parquet"]);
     let output = command.arg(WITH_SIGHT.as_path()).output().unwrap();
     let told = stderr(&output);
     assert_eq!(output.status.code(), Some(2), "{told}");
@@ -62,11 +62,11 @@ fn changed_steps_are_counted() {
     let was_visible = episodes(&WITH_SIGHT).iter().flat_map(|e| &e.steps).filter(|s| s.mirror_visible).count();
     assert!(was_visible > 0);
     let mut command = program(folder.path());
-    command.args(["replay", "--recompute-visibility", "--threshold", "100000", "--out", "x.parquet"]);
+    command.args(["world", "replay", "--recompute-visibility", "--threshold", "100000", "--out", "x.parquet"]);
     let output = succeeds(command.arg(WITH_SIGHT.as_path()));
     let expected = format!("mirror_visible differs at {was_visible} step");
     assert!(stdout(&output).contains(&expected), "{}", stdout(&output));
-    succeeds(program(folder.path()).arg("validate").arg(&out));
+    succeeds(program(folder.path()).args(["trace", "validate"]).arg(&out));
 }
 
 #[test]

@@ -58,5 +58,5 @@ pub fn copy(experiment: &str, change: impl FnOnce(&mut Vec<Episode>, &mut Value)
 }
 
 pub fn replay(path: &Path, words: &[&str]) -> Output {
-    program(path.parent().unwrap()).arg("replay").arg(path).args(words).output().unwrap()
+    program(path.parent().unwrap()).args(["world", "replay"]).arg(path).args(words).output().unwrap()
 }

@@ -70,7 +70,7 @@ fn traces_are_found_anywhere_by_their_hash() {
     let elsewhere = secluded();
     let report = at.join("old").display().to_string();
     fs::copy(at.join("late.toml"), elsewhere.path().join("late.toml")).unwrap();
-    let arguments = ["rescore", report.as_str(), "--definitions", "late.toml", "--out"];
+    let arguments = ["table", "rescore", report.as_str(), "--definitions", "late.toml", "--out"];
     run(elsewhere.path(), &[&arguments[..], &["above"]].concat()).ends(0);
     fs::create_dir(at.join("moved")).unwrap();
     for name in ["a.parquet", "b.parquet"] {

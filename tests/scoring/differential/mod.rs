@@ -1,6 +1,4 @@
-//! Two engines that share no code: the kernels, and the SQL lowering on Polars. They must agree on every integer of
-//! every episode, or refuse alike.
+//! Random traces and the words of random definitions, for engines that must agree.
 
-pub mod property;
 pub mod trace;
 pub mod words;

@@ -7,23 +7,21 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::Command;
 
-use engines::polars::score as polars;
-use metric::columns::{Columns, Type};
+use metric::columns::{Column, Columns, Level, Type};
 use metric::definitions::Definitions;
 use metric::sql::{self, Dialect};
 use score::score_traces;
 use score::table::EpisodeTable;
+use score::vocabulary;
 use serde_json::{Value, json};
 use trace::open::TraceSet;
 
-use crate::differential::property::{columns, load};
 use crate::differential::trace::{Sheet, open};
 use crate::harness::need;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Engine {
     Native,
-    Polars,
     Duckdb,
     Spark,
 }
@@ -84,13 +82,31 @@ pub fn answers_about(
     answers_to(engine, folder, &[prepared]).remove(0).remove(0)
 }
 
+/// The columns of these traces; columns that no file has are included, and are null.
+pub fn columns(traces: &TraceSet) -> Columns {
+    // Allow any column to be compared with any text.
+    let mut columns = vocabulary::trace_columns(traces).with_values::<String>([]);
+    for (name, ty) in [
+        ("points", Type::Int),
+        ("n4", Type::Int),
+        ("weight", Type::Float),
+        ("note", Type::Text),
+        ("grip open", Type::Bool),
+    ] {
+        columns.set_own(name, Column { ty, level: Level::Step });
+    }
+    columns
+}
+
+/// Loads the definitions for these traces.
+pub fn load(traces: &TraceSet, text: &str) -> Definitions {
+    Definitions::from_toml("random", text, &columns(traces)).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
+}
+
 fn answers_to(engine: Engine, folder: &Path, prepared: &[Prepared]) -> Vec<Answers> {
     match engine {
         Engine::Native => each(prepared, |traces, definitions| {
             score_traces::score(traces, definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())
-        }),
-        Engine::Polars => each(prepared, |traces, definitions| {
-            polars::score(traces, definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())
         }),
         Engine::Duckdb => outside("duckdb", &need::duckdb(), Dialect::Duckdb, folder, prepared),
         Engine::Spark => outside("spark", &need::spark(), Dialect::Spark, folder, prepared),

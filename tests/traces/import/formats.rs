@@ -200,7 +200,7 @@ fn the_folder_of_a_lerobot_data_set_is_imported_with_its_tasks() {
     // Another copy has the same ids. A copy with one different frame has other ids.
     let ids = |name: &str| {
         run(at, &import(name, &SET)).ends(0);
-        run(at, &["info", "x.parquet", "--episodes"]).done()
+        run(at, &["trace", "info", "x.parquet", "--episodes"]).done()
     };
     logs::lerobot_data_set(&at.join("copy"), &[Some(2), None, Some(5)], false);
     logs::lerobot_data_set(&at.join("other"), &[Some(2), None, Some(6)], false);

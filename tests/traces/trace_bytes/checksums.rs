@@ -144,7 +144,7 @@ fn every_reader_finds_every_page_with_a_wrong_checksum() {
                 assert_eq!(page.column, "description");
                 continue;
             }
-            let output = program(folder.path()).arg("validate").arg(&path).output().unwrap();
+            let output = program(folder.path()).args(["trace", "validate"]).arg(&path).output().unwrap();
             let told = told(&output);
             assert_eq!(output.status.code(), Some(1), "{name}, {page:?}: {told}");
             assert!(told.contains("CRC-32") && told.contains(&format!("byte {}", page.offset)), "{told}");

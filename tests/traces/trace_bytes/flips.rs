@@ -10,11 +10,11 @@ use trace::episode::Episode;
 use trace::inputs::Input;
 use trace::merge;
 use trace::validate::validate;
-use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use super::checksums::{draws, scores};
-use super::{encoded, episodes, trace};
+use super::trace;
 use crate::harness::files::fixture;
+use crate::harness::traces;
 
 /// The outcomes of some flips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -114,13 +114,14 @@ fn recorded() -> Vec<u8> {
     fs::read(fixture("recorded/E1-guesser.parquet")).unwrap()
 }
 
-/// The trace as written by versions before checksums.
+/// The trace as written by a program without checksums.
 fn unchecked() -> Vec<u8> {
-    let columns = OptionalColumns::used_by(&episodes());
-    encoded(
-        TraceEncoder::without_checksums(Vec::new(), &TraceMetadata { recording: None, columns }).unwrap(),
-        &episodes(),
-    )
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("trace.parquet");
+    fs::write(&path, trace()).unwrap();
+    let rows = traces::rows(&path);
+    traces::write_rows(&path, &[rows], None);
+    fs::read(&path).unwrap()
 }
 
 #[test]

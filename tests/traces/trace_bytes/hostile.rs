@@ -36,9 +36,11 @@ fn refused(name: &str, bytes: &[u8], said: &str) {
     std::fs::write(&path, bytes).unwrap();
     let table = folder.path().join("scores.csv");
     let table = table.to_str().unwrap();
-    for arguments in
-        [&["validate", "--threads", "1"][..], &["info", "--threads", "1"], &["score", "--threads", "1", "-o", table]]
-    {
+    for arguments in [
+        &["trace", "validate", "--threads", "1"][..],
+        &["trace", "info", "--threads", "1"],
+        &["score", "--threads", "1", "-o", table],
+    ] {
         let (code, told) = run(arguments, &path);
         assert!(matches!(code, Some(1 | 2)), "{name}, {}: {code:?}, {told}", arguments[0]);
         assert!(told.contains(said), "{name}, {}: {told}", arguments[0]);
@@ -81,7 +83,7 @@ fn a_sound_file_is_read_within_the_limits() {
     )
     .unwrap();
     let table = folder.path().join("scores.csv");
-    for arguments in [&["validate"][..], &["info"], &["score", "-o", table.to_str().unwrap()]] {
+    for arguments in [&["trace", "validate"][..], &["trace", "info"], &["score", "-o", table.to_str().unwrap()]] {
         let (code, told) = run(arguments, &path);
         assert_eq!(code, Some(0), "{}: {told}", arguments[0]);
     }

@@ -208,7 +208,7 @@ fn a_file_without_checksums_is_read_as_before() {
 
 /// Damaged bytes must not be copied and get checksums.
 #[test]
-fn a_damaged_trace_is_not_renormalized() {
+fn a_damaged_trace_is_not_sealed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("old.parquet");
     let step = Step {
@@ -217,15 +217,15 @@ fn a_damaged_trace_is_not_renormalized() {
         ..Step::default()
     };
     write_episodes(&path, None, &[traces::episode("a", vec![step])]).unwrap();
-    run(folder.path(), &["trace", "renormalize", "old.parquet", "-o", "new"]).done();
-    assert_eq!(findings(&folder.path().join("new/old.parquet")), []);
+    run(folder.path(), &["trace", "seal", "old.parquet", "new.parquet"]).done();
+    assert_eq!(findings(&folder.path().join("new.parquet")), []);
     let mut bytes = fs::read(&path).unwrap();
     let page = pages(&bytes).into_iter().find(|page| page.column == "action").unwrap();
     bytes[page.end - 1] ^= 1;
     fs::write(&path, bytes).unwrap();
-    let told = run(folder.path(), &["trace", "renormalize", "old.parquet", "-o", "newer"]).refused();
+    let told = run(folder.path(), &["trace", "seal", "old.parquet", "newer.parquet"]).refused();
     assert!(told.contains("CRC-32") && told.contains("`action`"), "{told}");
-    assert!(!folder.path().join("newer/old.parquet").exists());
+    assert!(!folder.path().join("newer.parquet").exists());
 }
 
 #[test]

@@ -8,7 +8,6 @@ use polars::prelude::{
 };
 
 use super::run::{PolarsError, collect};
-use score::error::ScoreError;
 use trace::labels::Labels;
 use trace::open::{TraceFile, TraceSet};
 use trace::schema::{Kind, Stored};
@@ -63,7 +62,7 @@ impl FrameColumn {
 /// The steps of all files, in order; rows are read when the frame is collected. Polars does not verify page checksums,
 /// so they are verified here.
 pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
-    verify_pages(traces).map_err(ScoreError::from)?;
+    verify_pages(traces)?;
     let (labels, read): (Vec<&FrameColumn>, Vec<&FrameColumn>) =
         columns.iter().partition(|column| traces.is_label_column(&column.name));
     traces.files().iter().try_for_each(check_folders)?;

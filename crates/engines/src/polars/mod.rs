@@ -1,8 +1,7 @@
-//! Polars in this process: it runs the SQL lowering for scores, and queries over traces.
+//! Polars in this process: it runs queries over traces.
 //!
-//! Rule: Polars reads the traces itself, lazily and streaming, and only the named files. It checks nothing, so the
-//! native reader checks the same columns before a score is accepted. A query is translated to Polars' expressions here,
-//! without Polars' own SQL: what has no translation that agrees with DuckDB is refused.
+//! Rule: Polars reads the traces itself, lazily and streaming, and only the named files. A query is translated to
+//! Polars' expressions here, without Polars' own SQL: what has no translation that agrees with DuckDB is refused.
 
 pub mod accepted;
 pub mod answer;
@@ -14,7 +13,6 @@ pub mod refused;
 mod relation;
 pub mod run;
 mod scope;
-pub mod score;
 mod select;
 pub mod shared_file;
 pub mod statement;

@@ -1,27 +1,18 @@
 //! Runs a frame on the streaming engine and reports errors in this program's words.
 
 use std::io;
-use std::thread;
 
 use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsError as Inner};
-use polars::sql::SQLContext;
 
-use metric::sql::LoweringError;
-use score::error::ScoreError;
 use trace::catch_panic::contained_on_all_threads;
+use trace::error::TraceError;
 
 #[derive(Debug, thiserror::Error)]
 pub enum PolarsError {
     #[error(transparent)]
-    Score(#[from] ScoreError),
-    #[error(transparent)]
-    Lowering(#[from] LoweringError),
+    Trace(#[from] TraceError),
     #[error("{file}: expected a file that can be read; was it moved?")]
     Unreadable { file: String, source: io::Error },
-    #[error("`{metric}` overflows 64-bit integers; use smaller numbers in its definition")]
-    Overflow { metric: String },
-    #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 for each episode")]
-    NotARate { metric: String, value: i64 },
     #[error("the reader of the answer is gone")]
     ReaderGone,
     #[error("Polars cannot do this: {0}")]
@@ -42,22 +33,6 @@ impl PolarsError {
     pub(super) fn panicked(words: String) -> Self {
         Self::Failed(cause(&words))
     }
-}
-
-pub(super) fn plan(context: &mut SQLContext, statement: &str) -> Result<LazyFrame, PolarsError> {
-    Ok(contained_on_all_threads(|| context.execute(statement)).map_err(PolarsError::panicked)??)
-}
-
-/// The stack on which Polars plans: it recurses over the statement, one frame per construct. Memory is committed only
-/// as far as the statement needs it.
-const STACK: usize = 256 << 20;
-
-pub(super) fn on_deep_stack<R: Send>(run: impl FnOnce() -> Result<R, PolarsError> + Send) -> Result<R, PolarsError> {
-    thread::scope(|scope| {
-        let thread = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
-        let thread = thread.map_err(|error| PolarsError::Failed(format!("no thread for it: {error}")))?;
-        thread.join().unwrap_or_else(|_| Err(PolarsError::Failed("it ended in a panic".into())))
-    })
 }
 
 pub(super) fn collect(frame: LazyFrame) -> Result<DataFrame, PolarsError> {

@@ -89,8 +89,8 @@ struct Binder<'a> {
 const DEEPEST: usize = 400;
 
 impl Binder<'_> {
-    /// Each name has one meaning. A column gives way to a definition of its name if only some traces have it, or if
-    /// older versions of the schema did not. So definitions mean the same whatever else was recorded.
+    /// Each name has one meaning. A column outside the schema gives way to a definition of its name, so that definitions
+    /// mean the same whatever else was recorded.
     fn check_names(&mut self) {
         let document = self.document;
         let lets = document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));

@@ -1,6 +1,5 @@
 //! The logical plan: typed operations, their text, their explanation, their ranges.
 
 pub mod explain;
-pub mod overflow;
 pub mod plan;
 pub(crate) mod print;

@@ -13,8 +13,6 @@ pub enum Dialect {
     /// Spark SQL.
     Spark,
     Duckdb,
-    /// Polars SQL, which `--engine polars` runs.
-    Polars,
 }
 
 /// The functions of a dialect that save a pass over the steps.
@@ -24,10 +22,7 @@ pub(super) struct Functions {
     pub(super) of_list: [&'static str; 3],
 }
 
-/// The smallest integer, which SQL cannot write as a literal.
-pub(super) const SMALLEST: &str = "(-9223372036854775807 - 1)";
-
-exact::names!(Dialect { Portable: "portable", Spark: "spark", Duckdb: "duckdb", Polars: "polars" });
+exact::names!(Dialect { Portable: "portable", Spark: "spark", Duckdb: "duckdb" });
 
 impl Dialect {
     pub(super) fn quoted(self, name: &str) -> String {
@@ -35,35 +30,35 @@ impl Dialect {
             Self::Portable | Self::Duckdb if is_plain(name) => name.to_owned(),
             Self::Spark if is_plain(name) && !is_keyword(name) => name.to_owned(),
             Self::Spark => format!("`{}`", name.replace('`', "``")),
-            Self::Polars | Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
+            Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
         }
     }
 
     pub fn output_name(self, metric: &str) -> String {
         match self {
             Self::Portable => metric.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect(),
-            Self::Spark | Self::Duckdb | Self::Polars => self.quoted(metric),
+            Self::Spark | Self::Duckdb => self.quoted(metric),
         }
     }
 
     pub fn output_alias(self, metric: &str) -> String {
         match self {
             Self::Portable => self.output_name(metric),
-            Self::Spark | Self::Duckdb | Self::Polars => metric.to_owned(),
+            Self::Spark | Self::Duckdb => metric.to_owned(),
         }
     }
 
     pub(super) const fn matches(self) -> Option<&'static str> {
         match self {
             Self::Portable => None,
-            Self::Spark | Self::Polars => Some("regexp_like"),
+            Self::Spark => Some("regexp_like"),
             Self::Duckdb => Some("regexp_matches"),
         }
     }
 
     pub(super) const fn functions(self) -> Option<Functions> {
         match self {
-            Self::Portable | Self::Polars => None,
+            Self::Portable => None,
             Self::Spark => {
                 Some(Functions { value_at: ["min_by", "max_by"], of_list: ["size", "array_min", "array_max"] })
             }
@@ -76,7 +71,7 @@ impl Dialect {
     pub(super) const fn any_value(self) -> &'static str {
         match self {
             Self::Duckdb => "any_value",
-            Self::Portable | Self::Spark | Self::Polars => "MIN",
+            Self::Portable | Self::Spark => "MIN",
         }
     }
 
@@ -99,7 +94,7 @@ impl Dialect {
         match self {
             // Spark reads backslashes in texts as escapes.
             Self::Spark => format!("'{}'", value.replace('\\', "\\\\").replace('\'', "\\'")),
-            Self::Portable | Self::Duckdb | Self::Polars => format!("'{}'", value.replace('\'', "''")),
+            Self::Portable | Self::Duckdb => format!("'{}'", value.replace('\'', "''")),
         }
     }
 
@@ -117,7 +112,7 @@ impl Dialect {
     pub fn pattern(self, pattern: &str) -> String {
         match self {
             Self::Spark => self.text(&java(pattern).unwrap_or_else(|| unreachable!("the binder has read the pattern"))),
-            Self::Portable | Self::Duckdb | Self::Polars => self.text(pattern),
+            Self::Portable | Self::Duckdb => self.text(pattern),
         }
     }
 
@@ -126,8 +121,6 @@ impl Dialect {
             Constant::Null => format!("CAST(NULL AS {})", self.type_name(ty)),
             Constant::Bool(value) => i64::from(*value).to_string(),
             Constant::Int(value) => self.integer(*value),
-            // Polars rejects an exponent without a point.
-            Constant::Float(bits) if self == Self::Polars => format!("CAST('{:?}' AS DOUBLE)", f64::from_bits(*bits)),
             Constant::Float(bits) => format!("CAST({:e} AS DOUBLE)", f64::from_bits(*bits)),
             Constant::Text(value) => self.text(value),
         }
@@ -149,27 +142,13 @@ impl Dialect {
             Arithmetic::Add => format!("({x} + {y})"),
             Arithmetic::Subtract => format!("({x} - {y})"),
             Arithmetic::Multiply => format!("({x} * {y})"),
-            Arithmetic::Remainder => format!("CASE WHEN {y} <> 0 THEN {} END", self.remainder(x, y)),
+            Arithmetic::Remainder => format!("CASE WHEN {y} <> 0 THEN {x} % {y} END"),
             Arithmetic::Quotient => match self {
-                Self::Polars | Self::Duckdb => {
-                    format!("CASE WHEN {y} <> 0 THEN ({x} - {}) // {y} END", self.remainder(x, y))
-                }
+                Self::Duckdb => format!("CASE WHEN {y} <> 0 THEN ({x} - {x} % {y}) // {y} END"),
                 Self::Spark => format!("CASE WHEN {y} <> 0 THEN ({x} DIV {y}) END"),
                 Self::Portable => format!("CASE WHEN {y} <> 0 THEN CAST(({x} - {x} % {y}) / {y} AS BIGINT) END"),
             },
         }
-    }
-
-    /// The remainder with the sign of x. Polars uses the sign of y, so y gets the sign of x; the smallest integer
-    /// cannot change its sign.
-    fn remainder(self, x: &str, y: &str) -> String {
-        if self != Self::Polars {
-            return format!("{x} % {y}");
-        }
-        format!(
-            "CASE WHEN {y} = {SMALLEST} AND {x} <> {SMALLEST} THEN {x} \
-             ELSE {x} % (CASE WHEN ({x} < 0) = ({y} < 0) THEN {y} ELSE (0 - {y}) END) END"
-        )
     }
 }
 

@@ -10,10 +10,6 @@ use super::one_pass::Windowed;
 use crate::columns::{Level, Type};
 use crate::plan::{Aggregate, Comparison, Constant, NodeId, Op};
 
-/// Positive infinity, and not-a-number.
-const INFINITY: &str = "CAST('inf' AS DOUBLE)";
-const NAN: &str = "CAST('NaN' AS DOUBLE)";
-
 impl Layout<'_> {
     fn counted(&self, text: impl FnOnce() -> String) -> String {
         if !self.spend(1) {
@@ -59,7 +55,7 @@ impl Layout<'_> {
                 format!("MIN(CASE WHEN s.{0} THEN 1 WHEN NOT s.{0} THEN 0 END)", self.name(name))
             }
             Op::Column(name) if node.ty == Type::Float => {
-                self.extreme("MIN", node.ty, &format!("CAST(s.{} AS DOUBLE)", self.name(name)))
+                format!("MIN(CAST(s.{} AS DOUBLE))", self.name(name))
             }
             Op::Column(name) => format!("{}(s.{})", self.dialect.any_value(), self.name(name)),
             Op::At(value, moment) => self.lookup(id, *value, *moment),
@@ -70,19 +66,17 @@ impl Layout<'_> {
                 Aggregate::All => format!("MIN(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::Count => {
                     // DuckDB sums integers in 128 bits, which keeps it from joining the passes well.
-                    let counted = format!("CASE WHEN {} THEN 1 END", self.truth(*x));
-                    format!("COUNT({})", self.each_step(*x, counted))
+                    format!("COUNT(CASE WHEN {} THEN 1 END)", self.truth(*x))
                 }
-                Aggregate::Min => self.extreme("MIN", node.ty, &self.value(*x)),
-                Aggregate::Max => self.extreme("MAX", node.ty, &self.value(*x)),
-                Aggregate::Sum => format!("SUM({})", self.each_step(*x, wide(&self.value(*x)))),
+                Aggregate::Min => format!("MIN({})", self.value(*x)),
+                Aggregate::Max => format!("MAX({})", self.value(*x)),
+                Aggregate::Sum => format!("SUM({})", wide(&self.value(*x))),
             },
             _ => self.value(id),
         }
     }
 
     fn lookup(&self, id: NodeId, value: NodeId, moment: NodeId) -> String {
-        let ty = self.plan.node(id).ty;
         let value = self.operand(value);
         match (self.landmark(id), self.dialect.functions()) {
             (Some((landmark, condition)), Some(functions)) => {
@@ -90,29 +84,8 @@ impl Layout<'_> {
                 let found = condition.map(|condition| format!("CASE WHEN {} THEN s.t END", self.truth(condition)));
                 format!("{function}({value}, {})", found.as_deref().unwrap_or("s.t"))
             }
-            _ => self.extreme("MAX", ty, &format!("CASE WHEN s.t = {} THEN {value} END", self.value(moment))),
+            _ => format!("MAX(CASE WHEN s.t = {} THEN {value} END)", self.value(moment)),
         }
-    }
-
-    pub(super) fn each_step(&self, summed: NodeId, text: String) -> String {
-        let nodes = self.plan.needed_by([summed]);
-        let varies = |id: &NodeId| {
-            let op = &self.plan.node(*id).op;
-            matches!(op, Op::Time | Op::Column(_) | Op::Lag(_)) || self.is_aggregate(*id)
-        };
-        if self.dialect != Dialect::Polars || nodes.iter().any(varies) {
-            return text;
-        }
-        format!("CASE WHEN s.t IS NOT NULL THEN {text} END")
-    }
-
-    /// The smallest or largest value. NaN exceeds all other numbers, but Polars ignores it.
-    fn extreme(&self, function: &str, ty: Type, value: &str) -> String {
-        if self.dialect != Dialect::Polars || ty != Type::Float {
-            return format!("{function}({value})");
-        }
-        let is_nan = format!("{function}(CASE WHEN {value} <= {INFINITY} THEN 0 WHEN {value} > {INFINITY} THEN 1 END)");
-        format!("CASE WHEN {is_nan} = 1 THEN {NAN} ELSE {function}({value}) END")
     }
 
     pub(super) fn read(&self, id: NodeId) -> Option<String> {

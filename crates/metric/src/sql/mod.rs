@@ -16,11 +16,10 @@
 //!
 //! The portable form uses only CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN (LEFT JOIN for `lag`) and arithmetic. Polars
 //! SQL, `DuckDB`, Spark SQL and `DataFusion` run it unchanged. It needs a second pass for a search between two
-//! landmarks. So does Polars, which cannot filter lists; `DuckDB` and Spark can.
+//! landmarks; `DuckDB` and Spark filter lists instead.
 //!
 //! The native engine refuses sums beyond 64 bits; other engines fail or wrap.
 
-mod checks;
 mod dialect;
 mod expression;
 mod layout;
@@ -30,7 +29,6 @@ mod statement;
 
 use std::collections::BTreeSet;
 
-pub use self::checks::lower_checks;
 pub use self::dialect::Dialect;
 use self::dialect::is_plain;
 use self::layout::Layout;
@@ -64,7 +62,7 @@ pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
     let roots: Vec<NodeId> = plan.outputs.iter().map(|output| output.node).chain(plan.filter).collect();
     let layout = Layout::new(&plan, dialect, &roots, &windowed);
     let mut statement = Statement::new(&layout);
-    statement.passes(&[])?;
+    statement.passes()?;
     statement.episodes()?;
     Ok(statement.text)
 }
@@ -139,7 +137,6 @@ mod tests {
         );
         insta::assert_snapshot!("spark", lower(&plan, Dialect::Spark).unwrap());
         insta::assert_snapshot!("duckdb", lower(&plan, Dialect::Duckdb).unwrap());
-        insta::assert_snapshot!("polars", lower(&plan, Dialect::Polars).unwrap());
     }
 
     #[test]
@@ -147,7 +144,7 @@ mod tests {
         for name in built_in_names() {
             let plan = Definitions::load(name, &schema_columns()).unwrap().plan;
             let passes = |dialect| lower(&plan, dialect).unwrap().matches("GROUP BY").count();
-            assert_eq!([Dialect::Duckdb, Dialect::Spark, Dialect::Polars].map(passes), [1, 1, 2], "{name}");
+            assert_eq!([Dialect::Duckdb, Dialect::Spark].map(passes), [1, 1], "{name}");
         }
     }
 

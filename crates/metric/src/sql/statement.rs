@@ -13,7 +13,7 @@ use exact::budget::Limit;
 const LONGEST: Limit = Limit::new("bytes of a statement", 4 << 20);
 
 pub(super) struct Statement<'l, 'p> {
-    pub(super) layout: &'l Layout<'p>,
+    layout: &'l Layout<'p>,
     pub(super) text: String,
     passes: usize,
 }
@@ -32,19 +32,14 @@ impl<'l, 'p> Statement<'l, 'p> {
         Self { layout, text: String::new(), passes: 0 }
     }
 
-    /// Writes all passes. `checks` are further aggregates: the pass, the node read at each step, and the column.
-    pub(super) fn passes(&mut self, checks: &[(usize, NodeId, String)]) -> Result<(), LoweringError> {
+    pub(super) fn passes(&mut self) -> Result<(), LoweringError> {
         let layout = self.layout;
-        let known = layout.needed.iter().map(|&id| layout.pass(id));
-        self.passes = known.chain(checks.iter().map(|check| check.0)).max().unwrap_or(0).max(1);
-        for pass in 1..=self.passes {
-            self.pass(pass, checks)?;
-        }
-        Ok(())
+        self.passes = layout.needed.iter().map(|&id| layout.pass(id)).max().unwrap_or(0).max(1);
+        (1..=self.passes).try_for_each(|pass| self.pass(pass))
     }
 
     /// `e2 AS (SELECT s.episode_id, ... AS n9 FROM steps s JOIN e1 ... GROUP BY s.episode_id)`
-    fn pass(&mut self, pass: usize, checks: &[(usize, NodeId, String)]) -> Result<(), LoweringError> {
+    fn pass(&mut self, pass: usize) -> Result<(), LoweringError> {
         let (layout, mut reads) = (self.layout, Reads::default());
         let opening = match pass {
             1 => "-- Pass 1 over the steps: constants, counts and landmarks of each episode.\nWITH ",
@@ -64,10 +59,6 @@ impl<'l, 'p> Statement<'l, 'p> {
         for &id in layout.needed.iter().filter(|&&id| layout.pass(id) == pass && layout.is_aggregate(id)) {
             self.column(4, &format!("{} AS {}", layout.aggregate(id), layout.column('n', id)))?;
             layout.aggregate_reads(id, &mut reads);
-        }
-        for (_, read, column) in checks.iter().filter(|check| check.0 == pass) {
-            self.column(4, column)?;
-            layout.reads(*read, &mut reads);
         }
         let earlier = std::mem::take(&mut reads.earlier);
         self.steps(pass, reads)?;
@@ -133,7 +124,10 @@ impl<'l, 'p> Statement<'l, 'p> {
             };
             self.column(2, &format!("{value} AS {}", layout.dialect.output_name(&output.name)))?;
         }
-        self.join();
+        self.text.push_str("\nFROM e1");
+        for pass in 2..=self.passes {
+            let _ = write!(self.text, "\nJOIN e{pass} ON e1.episode_id = e{pass}.episode_id");
+        }
         if let Some(filter) = layout.plan.filter {
             let _ = write!(self.text, "\nWHERE {}", layout.truth(filter));
         }
@@ -141,16 +135,9 @@ impl<'l, 'p> Statement<'l, 'p> {
         self.check_length()
     }
 
-    pub(super) fn column(&mut self, indent: usize, column: &str) -> Result<(), LoweringError> {
+    fn column(&mut self, indent: usize, column: &str) -> Result<(), LoweringError> {
         let _ = write!(self.text, ",\n{:indent$}{column}", "");
         self.check_length()
-    }
-
-    pub(super) fn join(&mut self) {
-        self.text.push_str("\nFROM e1");
-        for pass in 2..=self.passes {
-            let _ = write!(self.text, "\nJOIN e{pass} ON e1.episode_id = e{pass}.episode_id");
-        }
     }
 
     fn check_length(&self) -> Result<(), LoweringError> {

@@ -69,5 +69,5 @@ impl EpisodeTable {
 }
 
 fn may_be_absent(label: &str) -> bool {
-    [LOST, UNUSABLE_REPLIES].contains(&label) || schema::column(label).is_some_and(|column| column.since > 1)
+    [LOST, UNUSABLE_REPLIES].contains(&label) || schema::column(label).is_some_and(|column| !column.required)
 }

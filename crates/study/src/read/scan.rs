@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 use std::thread;
 
+use crate::backend::SparkJob;
 use crate::error::StudyError;
 use crate::inputs::{self, Source};
 use crate::question::STANDING_LABELS;
 use crate::results::{Outputs, Results};
-use crate::{Backend, Study, backend, losses, own_definitions, scores};
+use crate::{Backend, Study, losses, own_definitions, scores};
 use metric::definitions::Definitions;
 use report::cells::group::CONDITION;
 use score::quality::{QualityByCell, QualityReader};
@@ -105,8 +106,8 @@ impl Study {
         let mut results = match (&self.source, &self.backend) {
             (Source::Scores(files), Backend::Native) => Results::of(scores::read(files, &self.question)?),
             (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
-            (source, _) => {
-                let scored = Results::of(self.scored_elsewhere()?);
+            (source, Backend::Spark(cluster)) => {
+                let scored = Results::of(SparkJob::of_study(self, cluster.clone())?.score()?);
                 if let Source::Traces(traces) = source {
                     own_definitions::check(&self.question.bind(traces)?, traces, &scored.episodes)?;
                 }
@@ -140,13 +141,6 @@ impl Study {
         own_definitions::check(&definitions, traces, &episodes)?;
         let lost = tables.next().map(|table| ids(&table));
         Ok(Results { timelines, lost, quality, ..Results::of(episodes) })
-    }
-
-    fn scored_elsewhere(&self) -> Result<EpisodeTable, StudyError> {
-        match &self.backend {
-            Backend::Spark(cluster) => backend::SparkJob::of_study(self, cluster.clone())?.score(),
-            Backend::Native | Backend::Polars => backend::polars(self.source.traces()?, &self.question, self.threads),
-        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! The rows are hashed in a separate form that does not depend on their storage; the schema's text of the column
 //! describes it.
 //!
-//! Rule: later versions of the schema give today's episodes the same hash, and so does `renormalize`. Columns without
+//! Rule: later versions of the schema give today's episodes the same hash. Columns without
 //! values and derived columns are therefore left out.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -13,9 +13,13 @@
 //! Only English is read. [`VERSION`] changes with every change of meaning. Recordings contain it, and the column can be
 //! derived from the texts again at any time.
 
+use serde_json::{Map, Value};
+
 use crate::palette::Color;
 
 pub const VERSION: &str = "1";
+
+const VERSION_KEY: &str = "identification_version";
 
 /// The attribution if the agent says that it does not know.
 pub const UNKNOWN: &str = "unknown";
@@ -44,6 +48,24 @@ pub fn normal_form(identification: &str) -> Option<&'static str> {
         [] if !all.iter().any(|word| color(word).is_some()) => None,
         _ => Some(UNKNOWN),
     }
+}
+
+/// Sets the version of the rule where a recording has it, else beside its other keys; returns the previous version.
+pub fn put_version(recording: &mut Value) -> Option<String> {
+    let text = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+    if let Some(place) = find(recording) {
+        return Some(text(std::mem::replace(place, VERSION.into())));
+    }
+    recording[VERSION_KEY] = VERSION.into();
+    None
+}
+
+fn find(value: &mut Value) -> Option<&mut Value> {
+    let members: &mut Map<String, Value> = value.as_object_mut()?;
+    if members.contains_key(VERSION_KEY) {
+        return members.get_mut(VERSION_KEY);
+    }
+    members.iter_mut().find_map(|(_, inner)| find(inner))
 }
 
 fn clauses(text: &str) -> Vec<Vec<String>> {
@@ -141,3 +163,26 @@ const SYNONYMS: [(Color, &str); 10] = [
     (Color::White, "ivory whit"),
     (Color::Yellow, "gold golden lemon"),
 ];
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::{VERSION, put_version};
+
+    #[test]
+    fn the_version_is_replaced_where_it_stands() {
+        let mut recording = json!({ "version": 1, "agent": { "vlm": { "id": "x", "identification_version": "0" } } });
+        assert_eq!(put_version(&mut recording), Some("0".to_owned()));
+        assert_eq!(recording["agent"]["vlm"]["identification_version"], VERSION);
+        assert_eq!(recording.as_object().unwrap().len(), 2);
+    }
+
+    #[test]
+    fn a_recording_without_a_version_gets_one() {
+        let mut recording = json!({ "kind": "import" });
+        assert_eq!(put_version(&mut recording), None);
+        assert_eq!(recording, json!({ "kind": "import", "identification_version": VERSION }));
+        assert_eq!(put_version(&mut recording), Some(VERSION.to_owned()));
+    }
+}

@@ -8,6 +8,7 @@ use indexmap::IndexMap;
 use super::error::{Fault, Place};
 use super::line::{self, LineValue, Members};
 use super::{Limits, cell};
+use crate::identification::normal_form;
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use crate::schema::{COLUMNS, Column, Kind, Stored};
 use exact::suggest::nearest;
@@ -23,6 +24,8 @@ pub struct Own {
 pub(super) struct Columns {
     known: Vec<&'static str>,
     own: IndexMap<String, Inferred>,
+    /// True if attributions are read from texts.
+    pub(super) is_derived: bool,
 }
 
 #[derive(Debug, Default)]
@@ -40,6 +43,9 @@ const MOST_OWN: usize = 1000;
 /// 64-bit floats represent every integer up to this one.
 const EXACT: u64 = 1 << 53;
 const ABSENT: &str = "leave the cell empty, or write null, where there is no value; write infinities as Parquet";
+/// The attribution, and the text from which it is read if a step has no key for it.
+pub(super) const ATTRIBUTION: &str = "self_color";
+pub(super) const TEXT: &str = "identification";
 const SEE: &str = "`mirrorstats trace schema step` prints what a step may hold";
 
 impl Columns {
@@ -49,6 +55,10 @@ impl Columns {
     /// Columns in the names of folders are added; a different value in the row is a fault.
     pub(super) fn typed(members: Members, folders: &Members, limits: Limits<'_>) -> (Members, Option<Fault>) {
         let mut members = Self::with_types(members, limits);
+        if Self::lacks_attribution(&members, limits) {
+            let text = members.iter().find(|(key, _)| key == TEXT).and_then(|(_, value)| attribution(value));
+            members.push((ATTRIBUTION.to_owned(), text.map_or(LineValue::Null, LineValue::Text)));
+        }
         let mut fault = None;
         for (key, value) in Self::with_types(folders.clone(), limits) {
             match members.iter().find(|(name, _)| *name == key) {
@@ -62,6 +72,12 @@ impl Columns {
             }
         }
         (members, fault)
+    }
+
+    /// Returns true if the attribution is read from the text of the reply, since the step has no other.
+    pub(super) fn lacks_attribution(members: &Members, limits: Limits<'_>) -> bool {
+        let has = |name: &str| members.iter().any(|(key, _)| key == name);
+        limits.expected.domain.column(ATTRIBUTION).is_some() && has(TEXT) && !has(ATTRIBUTION)
     }
 
     fn with_types(mut members: Members, limits: Limits<'_>) -> Members {
@@ -180,6 +196,11 @@ impl Inferred {
             }
         }
     }
+}
+
+fn attribution(text: &LineValue) -> Option<String> {
+    let LineValue::Text(text) = text else { return None };
+    normal_form(text).map(str::to_owned)
 }
 
 /// Returns true if a value equals that of a folder's name, whose type may be unknown.

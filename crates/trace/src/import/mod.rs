@@ -9,6 +9,7 @@
 //! step. Episodes are ordered by their first lines.
 //!
 //! Rule: all or nothing. A line that cannot be taken unchanged fails the import; values are never filled in or dropped.
+//! The one exception: steps with an `identification` and no key `self_color` get it from the text.
 //! Memory holds the position of each step, not the steps.
 
 mod cell;
@@ -38,6 +39,7 @@ pub use text::Text;
 
 use super::declared::{Cluster, Origin};
 use super::error::TraceError;
+use super::identification::put_version;
 use super::inputs::Input;
 use super::schema::colors::palette::Palette;
 use super::schema::{Kind, Value};
@@ -142,6 +144,7 @@ fn survey(
                 continue;
             }
         };
+        columns.is_derived |= Columns::lacks_attribution(&members, limits);
         let (members, other) = Columns::typed(members, &text.folders, limits);
         faults.extend(other.map(|fault| fault.at(&line.place)));
         let found = columns.check(&members, &line.place, limits);
@@ -169,7 +172,10 @@ fn write(
     out: &Path,
     limits: Limits<'_>,
 ) -> Result<NewFile, ImportError> {
-    let recording = limits.recording(texts)?;
+    let mut recording = limits.recording(texts)?;
+    if columns.is_derived {
+        put_version(&mut recording);
+    }
     let file = NewFile::create(out).map_err(|error| TraceError::write(out, error))?;
     let failed = |error: ParquetError| TraceError::write(out, error);
     let known = columns.known().map(|column| (field(column), Some(column.stored.kind())));
@@ -181,7 +187,7 @@ fn write(
         (Field::new(&own.name, kind.map_or(DataType::Null, Kind::data_type), true), kind)
     });
     let mut rows = Gathered::new(known.chain(own));
-    let mut file = RowGroups::new(file, &rows.layout, Some(&recording), true).map_err(failed)?;
+    let mut file = RowGroups::new(file, &rows.layout, Some(&recording)).map_err(failed)?;
     for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
         for step in episode {
             let text = &mut texts[step.text];

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::columns::lowest;
+use super::columns::{ATTRIBUTION, TEXT, lowest};
 use crate::schema::colors::spelling::WORDS;
 use crate::schema::{COLUMNS, Column, Kind};
 
@@ -10,17 +10,20 @@ use crate::schema::{COLUMNS, Column, Kind};
 pub fn document() -> Value {
     let properties: Map<String, Value> =
         COLUMNS.iter().map(|column| (column.name.to_owned(), property(column))).collect();
-    let required: Vec<&str> = COLUMNS.iter().filter(|column| column.required).map(|column| column.name).collect();
+    let needed = |column: &&Column| column.required && column.name != ATTRIBUTION;
+    let required: Vec<&str> = COLUMNS.iter().filter(needed).map(|column| column.name).collect();
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A step of an episode",
         "description": "One line of the JSON lines that `mirrorstats import` reads. Lines of an episode may be in any \
                         order and in several files; t says where a step belongs, and runs 1..T without a gap. \
-                        An integer may be written with a point, as `2.0`. Other keys become columns of their own: in \
+                        An integer may be written with a point, as `2.0`. \
+                        Without `self_color`, it is read from `identification`. Other keys become columns of their own: in \
                         all lines true or false, numbers, or text; null anywhere.",
         "type": "object",
         "properties": properties,
         "required": required,
+        "anyOf": [{ "required": [ATTRIBUTION] }, { "required": [TEXT] }],
         "propertyNames": { "minLength": 1 },
         "additionalProperties": { "type": ["boolean", "number", "string", "null"] },
     })

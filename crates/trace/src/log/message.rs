@@ -23,7 +23,7 @@ pub enum EpisodeMessage {
         /// Its fingerprint, which is unknown before the first answer; the column of that name.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         fingerprint: Option<String>,
-        /// The hash of its rows; the column of that name. Logs of earlier versions have none.
+        /// The hash of its rows; the column of that name.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         episode_hash: Option<String>,
     },

@@ -56,7 +56,7 @@ pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> 
     Ok(None)
 }
 
-/// The hashes of a log's episodes by id, from their ends; logs of earlier versions have none.
+/// The hashes of a log's episodes by id, from their ends; an episode without a hash is left out.
 pub fn episode_hashes(path: &Path) -> Result<BTreeMap<String, String>, LogError> {
     let mut hashes = BTreeMap::new();
     for message in LogReader::open(path)? {

@@ -41,11 +41,6 @@ pub(crate) const fn most_shown(bytes: u64) -> Limit {
     Limit::new("bytes of an episode that is shown", 48 << 20).and_beyond(1 << 20, 64, bytes)
 }
 
-/// The largest list of changed attributions, each with a kilobyte besides its text.
-pub(crate) const fn most_changed(bytes: u64) -> Limit {
-    Limit::in_proportion("bytes of changed attributions in traces of their size", 64 << 20, 64, bytes)
-}
-
 /// The most values that an import reads one by one: rows of constant columns take no bytes.
 pub(crate) const fn most_imported(bytes: u64) -> Limit {
     Limit::in_proportion("rows times columns of a file of its size", 8_000_000, 16, bytes)

@@ -64,17 +64,12 @@ impl TraceSet {
 
     /// The schema's column of this name in these files; `None` for an own column.
     pub fn schema_column(&self, name: &str) -> Option<&'static Column> {
-        let is_known = |known: &&'static Column| match self.domain() {
-            Domain::Mirror => known.since == 1 || self.declares(name),
-            Domain::Own => self.declares(name),
-        };
-        schema::column(name).filter(is_known)
+        schema::column(name).filter(|_| self.domain() == Domain::Mirror || self.declares(name))
     }
 
     /// Returns true if the schema's column keeps its meaning in these files, present or not.
     pub fn knows(&self, known: &Column) -> bool {
-        let is_free = self.domain() == Domain::Mirror && known.since == 1;
-        self.domain().has(known) && (is_free || self.column(known.name).is_none() || self.declares(known.name))
+        self.domain().has(known) && (self.column(known.name).is_none() || self.declares(known.name))
     }
 
     pub fn of(files: Vec<TraceFile>) -> Self {

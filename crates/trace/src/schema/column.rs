@@ -2,7 +2,6 @@ use arrow::datatypes::DataType;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::SCHEMA_VERSION;
 use super::field_access::{Access, Value, access};
 use crate::answers::{Answered, is_answer};
 use crate::diagnostic::Code;
@@ -23,8 +22,6 @@ pub struct Column {
     pub unit: Option<&'static str>,
     pub doc: &'static str,
     pub values: &'static [&'static str],
-    /// The first schema version with the column. In an older trace, a column of this name may mean something else.
-    pub since: u32,
     /// The value if a trace has no such column or a row has no value: an expression in the language of definitions.
     /// `null` means that a missing column equals a column without values, so that definitions may read it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -176,7 +173,6 @@ impl Column {
             unit: None,
             doc: "An answer that the experiment declares, or what it should be.",
             values: &[],
-            since: SCHEMA_VERSION,
             default: None,
             rule: None,
             color: None,

@@ -56,8 +56,6 @@ struct DomainColumn {
     mark: bool,
     #[serde(default)]
     task: bool,
-    #[serde(default = "first_version")]
-    since: u32,
     unit: Option<String>,
     default: Option<String>,
     #[serde(default)]
@@ -72,10 +70,6 @@ struct DomainColumn {
 struct DomainColor {
     word: Option<String>,
     advice: String,
-}
-
-const fn first_version() -> u32 {
-    1
 }
 
 impl DomainColumn {
@@ -93,7 +87,6 @@ impl DomainColumn {
             unit: self.unit.map(kept),
             doc: kept(self.help),
             values: self.values.into_iter().map(kept).collect::<Vec<&str>>().leak(),
-            since: self.since,
             default: self.default.map(kept),
             rule: self.rule,
             color: self.color.map(color),

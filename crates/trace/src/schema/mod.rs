@@ -18,7 +18,7 @@ pub use domain::{COLUMNS, DeclaredColumn, Domain, column};
 pub use field_access::Value;
 pub(crate) use field_access::value_at;
 
-/// The newest schema version. A trace is written with the oldest version that has its columns.
+/// The schema version of every trace that this program writes.
 pub const SCHEMA_VERSION: u32 = 2;
 
 /// The required columns without a meaning in some tasks. A trace may lack one if every experiment in its footer
@@ -41,8 +41,8 @@ pub(crate) const CHECKSUMS_KEY: &str = parquet_pages::checksums::KEY;
 pub const METADATA: &[MetadataKey] = &[
     MetadataKey {
         key: VERSION_KEY,
-        doc: "The version of this schema, a decimal integer. A file without it is read as the newest; a newer one than \
-              that is refused.",
+        doc: "The version of this schema, a decimal integer. Another version is refused. A file without it is one of \
+              another writer, and its columns are checked all the same.",
     },
     MetadataKey { key: WRITER_KEY, doc: "The program that wrote the file: `mirrorstats` and its version." },
     MetadataKey {

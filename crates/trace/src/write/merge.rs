@@ -258,7 +258,7 @@ pub fn write_in(
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
     let file = NewFile::create_in(scratch, path).map_err(|error| failed(error.into()))?;
-    let encoded = RowGroups::new(file, &schema, recording, true).and_then(|mut row_groups| {
+    let encoded = RowGroups::new(file, &schema, recording).and_then(|mut row_groups| {
         episodes.iter().try_for_each(|episode| row_groups.write(&episode.rows))?;
         row_groups.finish(None)
     });

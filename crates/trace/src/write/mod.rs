@@ -7,9 +7,8 @@
 
 pub(crate) mod decode_episode;
 pub mod merge;
-pub mod renormalize;
-pub(super) mod rewrite;
 pub(super) mod row_groups;
+pub mod seal;
 
 use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
@@ -127,21 +126,12 @@ pub struct TraceEncoder<W: Write + Send> {
 
 impl<W: Write + Send> TraceEncoder<W> {
     pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        Self::with(out, metadata, true)
-    }
-
-    /// Starts a trace without checksums, with the same bytes as versions before checksums.
-    pub fn without_checksums(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        Self::with(out, metadata, false)
-    }
-
-    fn with(out: W, metadata: &TraceMetadata, has_checksums: bool) -> Result<Self, TraceError> {
         let recording = metadata.recording.as_ref().unwrap_or(&serde_json::Value::Null);
         let palette = DeclaredPalette::of("stream", recording).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
         let recording = metadata.recording.as_ref();
-        let file = RowGroups::new(out, &gathered.layout, recording, has_checksums).map_err(failed)?;
+        let file = RowGroups::new(out, &gathered.layout, recording).map_err(failed)?;
         Ok(Self { file, columns, gathered, undeclared, palette, seen: HashSet::new() })
     }
 

@@ -1,6 +1,6 @@
 //! Gathers rows by column for the row groups of a file; an episode is never in two row groups.
 //!
-//! Rule: every trace gets its checksums here or in `rewrite`, unless it must equal the bytes of an earlier version.
+//! Rule: every trace gets its checksums here or in `seal`.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::Result;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
+use parquet::file::properties::WriterProperties;
 
 use crate::schema::{self, Column, Kind, Value};
 use parquet_pages::checksums::{self, CREATED_BY, Held};
@@ -26,7 +26,6 @@ const GATHERED_ROWS: usize = 8 * 1024;
 
 pub(crate) struct RowGroups<W: Write + Send> {
     parquet: ArrowWriter<Held<W>>,
-    has_checksums: bool,
     rows: usize,
 }
 
@@ -45,18 +44,11 @@ pub(crate) enum Values {
 }
 
 impl<W: Write + Send> RowGroups<W> {
-    pub(crate) fn new(
-        out: W,
-        layout: &SchemaRef,
-        recording: Option<&serde_json::Value>,
-        has_checksums: bool,
-    ) -> Result<Self> {
-        let properties = properties(layout, recording);
-        let properties = if has_checksums { properties.set_created_by(CREATED_BY.to_owned()) } else { properties };
+    pub(crate) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
         // Parquet's logical types are complete; an embedded Arrow schema would only pin one library's view.
-        let options = ArrowWriterOptions::new().with_properties(properties.build()).with_skip_arrow_metadata(true);
+        let options = ArrowWriterOptions::new().with_properties(properties(recording)).with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(Held::new(out), Arc::clone(layout), options)?;
-        Ok(Self { parquet, has_checksums, rows: 0 })
+        Ok(Self { parquet, rows: 0 })
     }
 
     pub(crate) fn end_episode(&mut self, gathered: &mut Gathered) -> Result<()> {
@@ -81,28 +73,24 @@ impl<W: Write + Send> RowGroups<W> {
         if let Some(mut gathered) = gathered.filter(|gathered| gathered.rows > 0) {
             self.parquet.write(&gathered.take()?)?;
         }
-        if self.has_checksums {
-            checksums::finish(self.parquet.into_serialized_writer()?.0)
-        } else {
-            self.parquet.into_inner()?.release()
-        }
+        checksums::finish(self.parquet.into_serialized_writer()?.0)
     }
 }
 
-fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterPropertiesBuilder {
+fn properties(recording: Option<&serde_json::Value>) -> WriterProperties {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
-    let known = layout.fields().iter().filter_map(|field| schema::column(field.name()));
-    let version = known.map(|column| column.since).max().unwrap_or(1);
     let mut pairs = vec![
-        pair(schema::VERSION_KEY, version.to_string()),
+        pair(schema::VERSION_KEY, schema::SCHEMA_VERSION.to_string()),
         pair(schema::WRITER_KEY, concat!("mirrorstats ", env!("CARGO_PKG_VERSION")).to_owned()),
     ];
     pairs.extend(recording.map(|json| pair(schema::RECORDING_KEY, json.to_string())));
     WriterProperties::builder()
         .set_key_value_metadata(Some(pairs))
+        .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         // Row groups end with an episode, never at a number of rows.
         .set_max_row_group_row_count(None)
+        .build()
 }
 
 impl Gathered {

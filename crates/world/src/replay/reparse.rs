@@ -16,9 +16,9 @@ use crate::experiment::{Experiment, Spec};
 use trace::answers::{Answered, columns_of};
 use trace::episode::{Action, Episode, Step};
 use trace::error::TraceError;
+use trace::identification::put_version;
 use trace::inputs::Input;
 use trace::open::TraceFile;
-use trace::renormalize::put_version;
 use trace::write::merge::{self, NotAnEpisode};
 use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 

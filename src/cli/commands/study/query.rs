@@ -54,7 +54,7 @@ mod rows {
     use super::{Failure, Outcome, QueryArgs};
 
     pub fn answer(_: &QueryArgs) -> Result<Outcome, Failure> {
-        Err(study::StudyError::WithoutPolars { what: "query" }.into())
+        Err(study::StudyError::WithoutPolars.into())
     }
 }
 

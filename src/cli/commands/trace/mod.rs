@@ -5,7 +5,6 @@ pub mod import;
 pub mod info;
 pub mod labels;
 pub mod recover;
-pub mod renormalize;
 pub mod schema;
 pub mod seal;
 pub mod validate;
@@ -20,7 +19,6 @@ pub enum TraceCommand {
     Validate(validate::ValidateCommand),
     Check(check::CheckArgs),
     Recover(recover::RecoverArgs),
-    Renormalize(renormalize::RenormalizeArgs),
     Schema(schema::SchemaCommand),
     Seal(seal::SealArgs),
 }
@@ -33,7 +31,6 @@ impl TraceCommand {
             Self::Validate(args) => args.run(),
             Self::Check(args) => args.run(),
             Self::Recover(args) => args.run(),
-            Self::Renormalize(args) => args.run(),
             Self::Schema(args) => args.run(),
             Self::Seal(args) => args.run(),
         }

@@ -106,9 +106,8 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
 fn meaning(column: &Column) -> String {
     let values = (!column.values.is_empty()).then(|| format!("One of {}.", column.values.join(", ")));
     let default = column.default.map(|default| format!("No value means {default}."));
-    let since = (column.since > 1).then(|| format!("Since version {}.", column.since));
     let doc = Some(column.doc.to_owned());
-    [doc, values, default, since].into_iter().flatten().collect::<Vec<_>>().join(" ")
+    [doc, values, default].into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
 fn width() -> usize {

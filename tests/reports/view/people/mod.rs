@@ -188,7 +188,7 @@ fn two_people_play_at_once_and_one_is_removed() {
     run(folder.path(), &["trace", "validate", "runs"]).done();
     assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
     run(folder.path(), &["world", "replay", "runs"]).done();
-    let recover = ["recover", "runs/E1-people.mcap", "-o", "log.parquet"];
+    let recover = ["trace", "recover", "runs/E1-people.mcap", "-o", "log.parquet"];
     run(folder.path(), &recover).done();
     assert_eq!(
         run(folder.path(), &["score", "log.parquet", "--json"]).done().lines().count(),

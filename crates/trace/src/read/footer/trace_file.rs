@@ -38,7 +38,6 @@ use parquet_pages::{Expansion, Store, rows_of, with_texts_as_keys};
 pub struct TraceFile {
     input: Input,
     bytes: u64,
-    version: u32,
     domain: Domain,
     columns: Vec<FileColumn>,
     folders: Vec<FolderColumn>,
@@ -73,7 +72,7 @@ impl TraceFile {
     pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
         let opened = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
         let Footer { bytes, metadata, checksums, .. } = opened;
-        let version = version_of(&input.name, &metadata).map_err(|finding| vec![*finding])?;
+        check_version(&input.name, &metadata).map_err(|finding| vec![*finding])?;
         let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
         let mut pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
         let recording = footers::recording(value(&pairs, schema::RECORDING_KEY));
@@ -83,7 +82,7 @@ impl TraceFile {
         let folders = folders.map_err(|finding| vec![*finding])?;
         let all = with_folders(&columns, &folders);
         let domain = Domain::of_file(|name| all.iter().any(|column| column.name == name), &recording);
-        let mut findings = check_columns(&input.name, &all, version, domain, &absent);
+        let mut findings = check_columns(&input.name, &all, domain, &absent);
         findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {
             return Err(findings);
@@ -100,7 +99,6 @@ impl TraceFile {
         Ok(Self {
             input: input.clone(),
             bytes,
-            version,
             domain,
             columns,
             folders,
@@ -147,7 +145,7 @@ impl TraceFile {
             Domain::Mirror => Vec::new(),
             Domain::Own => {
                 let all = with_folders(&self.columns, &self.folders);
-                check_columns(self.name(), &all, self.version, Domain::Mirror, &[])
+                check_columns(self.name(), &all, Domain::Mirror, &[])
             }
         }
     }
@@ -183,12 +181,11 @@ impl TraceFile {
         all.into_iter().find(|column| column.name == name)
     }
 
-    /// Returns true if the file has the schema's column of this name. A trace of an older version may have an own
-    /// column of that name.
+    /// Returns true if the file has the schema's column of this name.
     pub fn declares(&self, name: &str) -> bool {
         let Some((column, known)) = self.column(name).zip(self.domain.column(name)) else { return false };
         let has_kind = || column.kind.is_none_or(|kind| kind == known.stored.kind());
-        known.since <= self.version && (self.domain == Domain::Mirror || has_kind())
+        self.domain == Domain::Mirror || has_kind()
     }
 
     pub fn rows(&self) -> u64 {
@@ -260,23 +257,17 @@ fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {
     pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
 }
 
-fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding>> {
-    // Files of other writers have none; their columns are checked all the same.
+/// Files of other writers have no version; their columns are checked all the same.
+fn check_version(file: &str, metadata: &ParquetMetaData) -> Result<(), Box<Finding>> {
     let pairs = metadata.file_metadata().key_value_metadata();
-    let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else {
-        return Ok(schema::SCHEMA_VERSION);
+    let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else { return Ok(()) };
+    let expected = format!("schema version {}", schema::SCHEMA_VERSION);
+    let (code, found) = match text.parse::<u32>() {
+        Ok(schema::SCHEMA_VERSION) => return Ok(()),
+        Ok(version) if version > schema::SCHEMA_VERSION => (Code::NewerSchema, format!("version {version}")),
+        _ => (Code::InvalidMetadata, format!("`{}`", visible(text))),
     };
-    match text.parse::<u32>() {
-        Ok(version) if version > schema::SCHEMA_VERSION => {
-            let expected = format!("schema version {} or older", schema::SCHEMA_VERSION);
-            Err(Box::new(Finding::new(Code::NewerSchema, file, expected, format!("version {version}"))))
-        }
-        Ok(version) if version > 0 => Ok(version),
-        _ => {
-            let expected = format!("`{}` to be a whole number from 1", schema::VERSION_KEY);
-            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", visible(text)))))
-        }
-    }
+    Err(Box::new(Finding::new(code, file, expected, found)))
 }
 
 pub(crate) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
@@ -317,7 +308,7 @@ fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
     }
 }
 
-fn check_columns(file: &str, columns: &[FileColumn], version: u32, domain: Domain, absent: &[&str]) -> Vec<Finding> {
+fn check_columns(file: &str, columns: &[FileColumn], domain: Domain, absent: &[&str]) -> Vec<Finding> {
     if let Err(exceeded) = MOST_COLUMNS.check(columns.len() as u64) {
         return vec![Finding::over_budget(file, &exceeded)];
     }
@@ -330,8 +321,7 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32, domain: Domai
             findings.push(finding.in_column(&column.name));
         }
     }
-    let holds =
-        |known: &&Column| known.since <= version && (domain == Domain::Mirror || known.required && domain.has(known));
+    let holds = |known: &&Column| domain == Domain::Mirror || known.required && domain.has(known);
     for known in COLUMNS.iter().filter(holds) {
         let wanted = known.stored.kind();
         match columns.iter().find(|column| column.name == known.name) {

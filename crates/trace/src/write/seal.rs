@@ -1,25 +1,34 @@
 //! Copies a trace with checksums, to protect the files of writers without them.
+//!
+//! Rule: columns are copied as bytes, so their types, encodings and codecs stay. So do the row groups and the footer's
+//! own keys. Data that only speeds up reading (page indexes, bloom filters) is dropped.
 
 use std::fs::File;
-use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::slice;
 
-use parquet::file::metadata::RowGroupMetaData;
+use parquet::column::writer::ColumnCloseResult;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{ColumnChunkMetaData, RowGroupMetaData};
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::diagnostic::{Code, Finding};
-use super::error::TraceError;
-use super::inputs::Input;
-use super::open::{TraceFile, TraceSet};
-use super::read::footer::Extent;
-use super::validate::validate;
-use super::write::rewrite::with_checksums;
+use crate::catch_panic::contained;
+use crate::diagnostic::{Code, Finding};
+use crate::error::TraceError;
+use crate::inputs::Input;
+use crate::open::{TraceFile, TraceSet};
+use crate::read::footer::Extent;
+use crate::read::verify::verify_pages;
+use crate::validate::validate;
 use exact::hash;
 use exact::replace::{NewFile, TargetIsInput, TemporaryFolder, check_target, folder_of};
-use parquet_pages::checksums::Checksums;
+use parquet_pages::checksums::{self, CREATED_BY, Checksums, Held};
+use parquet_pages::rows_of;
 
 /// A sealed copy.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -59,7 +68,7 @@ pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
     let stage = TemporaryFolder::create(folder_of(out), &name).map_err(unwritable)?;
     let staged = stage.path().join("copy.parquet");
     let file = File::create(&staged).map_err(unwritable)?;
-    with_checksums(&set, file).map_err(|error| error.writing(out))?;
+    copy_with_checksums(&set, file).map_err(|error| error.writing(out))?;
     let copy = Input { name: Input::new(out).name, path: staged };
     let (episodes, steps) = sound(&copy, threads)?;
     compare(&set.files()[0], &TraceSet::open(slice::from_ref(&copy))?.files()[0])?;
@@ -77,6 +86,50 @@ fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError>
     let checked = validate(slice::from_ref(input), None, threads)?;
     let counts = checked.files.first().map_or((0, 0), |file| (file.episodes, file.steps));
     checked.errors().map(|()| counts)
+}
+
+/// Writes the trace of a set's only file to `out` with checksums.
+fn copy_with_checksums<W: Write + Send>(set: &TraceSet, out: W) -> Result<W, TraceError> {
+    let file = &set.files()[0];
+    // Copied columns get new checksums, which must not hide damaged bytes.
+    verify_pages(set)?;
+    let failed = |error: ParquetError| TraceError::write(file.name(), error);
+    let metadata = file.footer_again(Extent::Whole)?.metadata;
+    let properties = WriterProperties::builder()
+        .set_key_value_metadata(Some(file.pairs.clone()))
+        .set_created_by(CREATED_BY.to_owned())
+        // Copied chunks have no page index here, and a file has one for all columns or for none.
+        .set_statistics_enabled(EnabledStatistics::Chunk)
+        .set_offset_index_disabled(true);
+    let schema = metadata.file_metadata().schema_descr().root_schema_ptr();
+    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties.build().into()).map_err(failed)?;
+    let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
+    for row_group in metadata.row_groups() {
+        let mut group = writer.next_row_group().map_err(failed)?;
+        for chunk in row_group.columns() {
+            copy(&mut group, chunk, rows_of(row_group), &input).map_err(failed)?;
+        }
+        group.close().map_err(failed)?;
+        checksums::pass_on(&mut writer).map_err(failed)?;
+    }
+    checksums::finish(writer).map_err(failed)
+}
+
+fn copy<W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    chunk: &ColumnChunkMetaData,
+    rows: usize,
+    input: &File,
+) -> parquet::errors::Result<()> {
+    let close = ColumnCloseResult {
+        bytes_written: u64::try_from(chunk.compressed_size()).unwrap_or_default(),
+        rows_written: rows as u64,
+        metadata: chunk.clone(),
+        bloom_filter: None,
+        column_index: None,
+        offset_index: None,
+    };
+    contained(|| group.append_column(input, close)).map_err(ParquetError::General)?
 }
 
 fn compare(old: &TraceFile, new: &TraceFile) -> Result<(), TraceError> {

@@ -16,10 +16,16 @@ use world::agent::vlm::probe::{ProbeAnswer, probe};
 use world::agent::vlm::provider::{Patience, Provider, check_transport};
 use world::agent::vlm::secrets::Secret;
 use world::agent::vlm::wire_format::{Dialect, Effort};
-use world::agent::vlm::{OnOutage, Tier, Vlm};
+use world::agent::vlm::{OnOutage, Vlm};
 use world::agent::{Agent, Lost, Player, Task};
 use world::experiment::Spec;
 use world::record::plan::slug;
+
+/// A service tier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Tier {
+    Flex,
+}
 
 /// A model, who serves it, and what a recording with it may spend.
 #[derive(Clone, Debug, clap::Args)]
@@ -73,9 +79,8 @@ pub struct VlmArgs {
     /// Attempts for one step
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
-    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of OpenAI, Google
-    /// and Anthropic, which sends the current steps of all episodes as one batch
-    #[arg(long, value_name = "flex|batch", value_parser = tier)]
+    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes
+    #[arg(long, value_name = "flex", value_enum)]
     tier: Option<Tier>,
     /// Seconds for one answer [default: 180, or 900 with --tier flex]
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=3_600))]
@@ -118,10 +123,7 @@ impl VlmArgs {
             choice.check_prices().map_err(Failure::input)?;
         }
         let network = network()?;
-        let mut provider = self.provider(&choice)?;
-        if self.tier == Some(Tier::Batch) {
-            provider = provider.in_batches();
-        }
+        let provider = self.provider(&choice)?;
         let journals = out.join(JOURNALS);
         let slug = slug(&choice.name);
         let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
@@ -180,8 +182,8 @@ impl VlmArgs {
         if self.prompt_only {
             choice.model.contract = Contract::Prompt;
         }
-        if let Some(tier) = self.tier {
-            choice.use_tier(tier).map_err(Failure::input)?;
+        if self.tier.is_some() {
+            choice.use_flex_tier().map_err(Failure::input)?;
         }
         choice.model.accepted.clone_from(&self.accept_model);
         choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
@@ -205,7 +207,7 @@ impl VlmArgs {
         }
         let patience = Patience {
             attempts: self.attempts,
-            timeout: Duration::from_secs(self.timeout.unwrap_or(if self.tier == Some(Tier::Flex) { 900 } else { 180 })),
+            timeout: Duration::from_secs(self.timeout.unwrap_or(if self.tier.is_some() { 900 } else { 180 })),
             interval: self.requests_per_minute.map_or(Duration::ZERO, |count| Duration::from_mins(1) / count),
             ..Patience::default()
         };
@@ -222,14 +224,6 @@ fn network() -> Result<Runtime, Failure> {
 fn amount(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().map_err(|fault| fault.to_string())?;
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
-}
-
-fn tier(text: &str) -> Result<Tier, String> {
-    match text {
-        "flex" => Ok(Tier::Flex),
-        "batch" => Ok(Tier::Batch),
-        _ => Err("expected flex or batch".to_owned()),
-    }
 }
 
 fn effort(text: &str) -> Result<Effort, String> {

@@ -22,8 +22,7 @@ impl Vlm {
             Memory::Journals(_) => Journal::open(&path)?,
             Memory::Cassette(_) => Journal::cassette(&path)?,
         };
-        let (vlm, episode) = (Arc::clone(self), episode.to_owned());
-        Ok(VlmAgent { vlm, task, episode, journal: Arc::new(Mutex::new(journal)), begun: None })
+        Ok(VlmAgent { vlm: Arc::clone(self), task, journal: Arc::new(Mutex::new(journal)), begun: None })
     }
 }
 
@@ -31,7 +30,6 @@ impl Vlm {
 pub struct VlmAgent {
     vlm: Arc<Vlm>,
     task: Task,
-    episode: String,
     journal: Arc<Mutex<Journal>>,
     begun: Option<Begun>,
 }
@@ -70,7 +68,6 @@ impl VlmAgent {
             vlm: Arc::clone(&self.vlm),
             journal: Arc::clone(&self.journal),
             t: observation.t,
-            id: hash::of_bytes(format!("{} {} {question} {frame}", self.episode, observation.t).as_bytes()),
             frame,
             body: self.vlm.choice.body(&words, &schema, &STANDARD.encode(png)),
             question,

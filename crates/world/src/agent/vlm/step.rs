@@ -17,8 +17,6 @@ pub(super) struct Step {
     pub(super) vlm: Arc<Vlm>,
     pub(super) journal: Arc<Mutex<Journal>>,
     pub(super) t: i32,
-    /// The request's unique name within a recording: 64 hexadecimal digits.
-    pub(super) id: String,
     pub(super) frame: String,
     pub(super) body: Value,
     pub(super) question: String,
@@ -93,7 +91,7 @@ impl Step {
             reserved.refused();
             return Err(lost);
         }
-        match provider.ask(turn, &self.id, &self.body).await {
+        match provider.ask(turn, &self.body).await {
             Ok(received) => {
                 let Received { answer, body, latency, .. } = received;
                 self.vlm.learn_from(&answer);

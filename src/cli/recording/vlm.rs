@@ -2,7 +2,7 @@
 
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
@@ -72,8 +72,7 @@ pub struct VlmArgs {
     /// The most concurrent requests; fewer if the provider reports too many
     #[arg(long, value_name = "N", default_value_t = 64)]
     at_once: usize,
-    /// The account's limit of requests per minute, over all processes that record into the folder [default: the limit
-    /// that the provider reports]
+    /// The account's limit of requests per minute [default: the limit that the provider reports]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) requests_per_minute: Option<u32>,
     /// Attempts for one step
@@ -94,8 +93,6 @@ pub struct VlmArgs {
 }
 
 const JOURNALS: &str = "journal";
-/// The folder of spending records, beside it.
-const LEDGERS: &str = "ledger";
 
 impl VlmArgs {
     pub fn name(&self) -> Option<&str> {
@@ -127,7 +124,6 @@ impl VlmArgs {
         let journals = out.join(JOURNALS);
         let slug = slug(&choice.name);
         let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
-        let ledger = Some(out.join(LEDGERS).join(format!("{slug}.json")));
         let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
         let vlm = Vlm::online(
             choice,
@@ -137,8 +133,8 @@ impl VlmArgs {
             Arc::new(Account::new(limits, Spend::default())),
             on_outage,
         );
-        let (vlm, at_once, network) = (Arc::new(vlm), self.at_once.max(1), Some(network));
-        Ok(VlmPlayer { vlm, at_once, network, ledger, slug, has_counted: OnceLock::new() })
+        vlm.count_spent(&slug).map_err(Failure::input)?;
+        Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
     }
 
     /// The player of a forecast: it reads the journals in the recording's folder, but has no key and sends no requests.
@@ -235,15 +231,11 @@ pub struct VlmPlayer {
     pub vlm: Arc<Vlm>,
     at_once: usize,
     network: Option<Runtime>,
-    ledger: Option<PathBuf>,
-    slug: String,
-    /// Set once the journals have been read.
-    has_counted: OnceLock<()>,
 }
 
 impl VlmPlayer {
     fn of_journals(vlm: Arc<Vlm>, at_once: usize) -> Self {
-        Self { vlm, at_once, network: None, ledger: None, slug: String::new(), has_counted: OnceLock::new() }
+        Self { vlm, at_once, network: None }
     }
 }
 
@@ -278,18 +270,11 @@ impl Player for VlmPlayer {
     }
 
     fn spend(&self) -> Option<Spend> {
-        self.network.as_ref()?;
-        if self.has_counted.set(()).is_ok() {
-            self.vlm.count_spent(&self.slug).ok()?;
-        }
-        Some(self.vlm.spend())
+        self.network.as_ref().map(|_| self.vlm.spend())
     }
 
     fn check(&self) -> Result<(), String> {
-        self.vlm.connect().map_err(|fault| fault.to_string())?;
-        let _ = self.has_counted.set(());
-        let share = |path| self.vlm.share_account(path, &self.slug).map_err(|fault| fault.to_string());
-        self.ledger.as_deref().map_or(Ok(()), share)
+        self.vlm.connect().map_err(|fault| fault.to_string())
     }
 
     fn stopped(&self) -> Option<String> {

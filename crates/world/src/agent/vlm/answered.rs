@@ -5,7 +5,6 @@ use std::path::Path;
 use super::journal::{Journal, JournalError, Recorded};
 use super::limits::Spend;
 use super::model::{Memory, Vlm, tokens};
-use exact::replace::folder_of;
 
 /// The average answer of finished episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,28 +31,10 @@ impl Vlm {
         }
     }
 
-    /// Adds the spending of earlier starts on the model, from its journals, for a start that spends nothing. `slug` is
-    /// the model's name in episode names.
+    /// Adds the spending of earlier starts on the model, from its journals. `slug` is the model's name in episode names.
     pub fn count_spent(&self, slug: &str) -> Result<(), JournalError> {
         let Memory::Journals(folder) = &self.memory else { return Ok(()) };
         self.account.begin_with(spent(self, folder, slug)?);
-        Ok(())
-    }
-
-    /// Shares the account with other processes that record the model into the same folder, by the ledger at this path.
-    /// `slug` is the model's name in episode names.
-    pub fn share_account(&self, ledger: &Path, slug: &str) -> Result<(), Box<dyn std::error::Error>> {
-        let (Memory::Journals(folder), Some(provider)) = (&self.memory, &self.provider) else { return Ok(()) };
-        provider.share(folder_of(ledger), &self.choice.backend.key)?;
-        let mut is_read = false;
-        self.account.share(ledger, provider.patience().timeout, || {
-            is_read = true;
-            spent(self, folder, slug).map_err(Box::<dyn std::error::Error>::from)
-        })?;
-        // The ledger includes their costs; the typical cost of an answer still comes from the journals.
-        if !is_read {
-            spent(self, folder, slug)?;
-        }
         Ok(())
     }
 

@@ -5,12 +5,12 @@
 //! request that was answered. A kept journal is a cassette: it replays the episode without a network.
 //!
 //! A last line that was cut off, or that a power loss left as zeros, is dropped when the file is opened again: it had
-//! no effect yet. Only one process at a time writes a journal.
+//! no effect yet. Only one process at a time writes a journal: the owner of the recording's folder.
 //!
 //! Journals hold no keys: [`Secrets`](super::secrets) are removed from answers before they are written.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -128,19 +128,8 @@ pub enum JournalError {
     Io { path: PathBuf, source: io::Error },
     #[error("line {line} of the journal `{}` is damaged: {fault}\n  help: remove the file to ask the model again", path.display())]
     Damaged { path: PathBuf, line: usize, fault: serde_json::Error },
-    #[error("the journal `{}` is being written by another process\n  help: wait until it ends, or record into another folder", path.display())]
-    Busy { path: PathBuf },
     #[error("the cassette has no `{}`\n  help: record the episode with its model first, or choose fewer episodes", path.display())]
     Missing { path: PathBuf },
-}
-
-impl Drop for Journal {
-    fn drop(&mut self) {
-        // A process being started may briefly hold a copy of the file, and its lock.
-        if let Some(file) = &self.file {
-            let _ = file.unlock();
-        }
-    }
 }
 
 impl Journal {
@@ -148,10 +137,6 @@ impl Journal {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         make_folder(folder_of(path)).map_err(failed)?;
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-        // If the file system has no locks, only the episode's lock protects the journal.
-        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-            return Err(JournalError::Busy { path: path.to_owned() });
-        }
         let (mut journal, whole) = Self::read(path)?;
         if whole < file.metadata().map_err(failed)?.len() {
             file.set_len(whole).map_err(failed)?;
@@ -333,16 +318,5 @@ mod tests {
             assert!(matches!(error, JournalError::Damaged { line: found, .. } if found == line), "{error}");
             assert_eq!(fs::read_to_string(&path).unwrap(), damaged);
         }
-    }
-
-    #[test]
-    fn one_writes_at_a_time_and_others_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = with_lines(folder.path(), 1);
-        let first = Journal::open(&path).unwrap();
-        assert!(matches!(Journal::open(&path).unwrap_err(), JournalError::Busy { .. }));
-        assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1"]);
-        drop(first);
-        assert_eq!(answered(&Journal::open(&path).unwrap()), ["answer 1"]);
     }
 }

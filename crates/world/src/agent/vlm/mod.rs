@@ -15,7 +15,7 @@
 //! | [`provider`] | sending requests: concurrency, failures, waits requested by providers |
 //! | [`probe`] | the parameters that a model takes |
 //! | `step` | the reaction to failures: another attempt, a lost episode, the end |
-//! | `spending` | a run's spending limits, over several processes; estimates |
+//! | `spending` | a run's spending limits; estimates |
 //! | [`journal`], `answered` | requests and answers on disk; statistics of a model from them |
 //! | [`secrets`] | keys, and texts without them |
 //!

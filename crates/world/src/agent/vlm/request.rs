@@ -5,9 +5,7 @@ use super::wire_format::{ModelAnswer, Question};
 use crate::agent::prompt;
 
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex"
-)]
+#[error("the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex")]
 pub struct NoTier {
     backend: String,
 }

@@ -11,9 +11,7 @@ mod preflight;
 pub mod rate_limit;
 mod waiting;
 
-use std::io;
 use std::net::IpAddr;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 pub(super) use parameter::{Mend, refused};
@@ -25,7 +23,6 @@ pub(super) use waiting::Waiting;
 use super::models::Backend;
 use super::secrets::Secret;
 use super::wire_format::{Dialect, ModelAnswer};
-use crate::record::plan::slug;
 use concurrency::{Pace, Permit};
 use failure::{Failure, broken, failed, no_answer, server};
 pub use preflight::Unreachable;
@@ -157,13 +154,6 @@ impl Provider {
     pub fn connect(&self) -> Result<(), Unreachable> {
         connect(&self.url, self.patience.connect_timeout)
             .map_err(|Unreachable { address, fault }| Unreachable { address: self.without_secret(&address), fault })
-    }
-
-    /// Shares the time of the next request with other processes, by a file in a folder. `key` identifies the account.
-    pub fn share(&self, folder: &Path, key: &str) -> io::Result<()> {
-        let address = self.url.origin().ascii_serialization();
-        let name = self.without_secret(&format!("at {address} {key}"));
-        self.pace.share(&folder.join(slug(&name)).with_extension("json"))
     }
 
     pub fn patience(&self) -> Patience {

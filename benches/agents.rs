@@ -20,11 +20,11 @@ use std::time::{Duration, Instant};
 
 use tokio::runtime::Runtime;
 use trace::episode::{Action, Step};
+use world::agent::vlm::Vlm;
 use world::agent::vlm::limits::Account;
 use world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
 use world::agent::vlm::provider::{Patience, Provider};
 use world::agent::vlm::wire_format::Dialect;
-use world::agent::vlm::{OnOutage, Vlm};
 use world::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
 use world::record::lock::FolderLock;
 use world::record::metadata;
@@ -111,7 +111,7 @@ impl Behind {
         };
         let choice = Choice { name: "a second".into(), model, backend, is_known: true };
         let (handle, account) = (network.handle().clone(), Arc::<Account>::default());
-        let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account, OnOutage::Lose);
+        let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account);
         Self { vlm: Arc::new(vlm), _network: network }
     }
 }

@@ -1,6 +1,6 @@
 //! A model behind a provider: its arguments and its player.
 
-use std::num::NonZeroU32;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,13 +10,13 @@ use tokio::runtime::Runtime;
 use crate::cli::{Failure, output};
 use exact::escape::visible;
 use trace::model_id::OWN_SERVER;
+use world::agent::vlm::Vlm;
 use world::agent::vlm::limits::{Account, Limits, Spend};
-use world::agent::vlm::models::{Choice, Contract, Models, ModelsError};
+use world::agent::vlm::models::{Choice, Models, ModelsError};
 use world::agent::vlm::probe::{ProbeAnswer, probe};
 use world::agent::vlm::provider::{Patience, Provider, check_transport};
 use world::agent::vlm::secrets::Secret;
 use world::agent::vlm::wire_format::{Dialect, Effort};
-use world::agent::vlm::{OnOutage, Vlm};
 use world::agent::{Agent, Lost, Player, Task};
 use world::experiment::Spec;
 use world::record::plan::slug;
@@ -48,9 +48,6 @@ pub struct VlmArgs {
     /// requested stops the recording
     #[arg(long, value_name = "ID")]
     accept_model: Vec<String>,
-    /// Ask for the reply's format in the prompt only; the provider does not enforce it
-    #[arg(long)]
-    prompt_only: bool,
     /// Stop before the model's cost in this folder, over all starts, exceeds this many US dollars; needs both prices of
     /// the model, or a router that reports the cost of an answer
     #[arg(long, value_name = "USD", value_parser = amount)]
@@ -69,9 +66,6 @@ pub struct VlmArgs {
     /// the file of models, else the provider's]
     #[arg(long, value_name = "EFFORT", value_parser = effort)]
     reasoning_effort: Option<Effort>,
-    /// The most concurrent requests; fewer if the provider reports too many
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    at_once: usize,
     /// The account's limit of requests per minute [default: the limit that the provider reports]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) requests_per_minute: Option<u32>,
@@ -84,13 +78,13 @@ pub struct VlmArgs {
     /// Seconds for one answer [default: 180, or 900 with --tier flex]
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=3_600))]
     timeout: Option<u64>,
-    /// If all attempts for a step fail, count a step without a decision instead of losing the episode
-    #[arg(long)]
-    stand_still_on_outage: bool,
     /// Replay the answers in an earlier recording's journals; nothing is sent
     #[arg(long, value_name = "DIR")]
     cassette: Option<PathBuf>,
 }
+
+/// Episodes in flight, and so requests, if --in-flight is absent; fewer if the provider reports too many.
+const IN_FLIGHT: usize = 64;
 
 const JOURNALS: &str = "journal";
 
@@ -107,8 +101,8 @@ impl VlmArgs {
         }
     }
 
-    /// The player, with its journals in the recording's folder.
-    pub fn player(&self, out: &Path) -> Result<VlmPlayer, Failure> {
+    /// The player, with its journals in the recording's folder; it sends at most `in_flight` requests at once.
+    pub fn player(&self, out: &Path, in_flight: Option<NonZeroUsize>) -> Result<VlmPlayer, Failure> {
         let choice = self.choice()?;
         if let Some(folder) = &self.cassette {
             let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
@@ -120,33 +114,31 @@ impl VlmArgs {
             choice.check_prices().map_err(Failure::input)?;
         }
         let network = network()?;
-        let provider = self.provider(&choice)?;
+        let provider = self.provider(&choice, in_flight.map_or(IN_FLIGHT, NonZeroUsize::get))?;
         let journals = out.join(JOURNALS);
         let slug = slug(&choice.name);
         let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
-        let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
         let vlm = Vlm::online(
             choice,
             provider,
             network.handle().clone(),
             journals,
             Arc::new(Account::new(limits, Spend::default())),
-            on_outage,
         );
         vlm.count_spent(&slug).map_err(Failure::input)?;
-        Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
+        Ok(VlmPlayer { vlm: Arc::new(vlm), in_flight: IN_FLIGHT, network: Some(network) })
     }
 
     /// The player of a forecast: it reads the journals in the recording's folder, but has no key and sends no requests.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
-        Ok(VlmPlayer::of_journals(vlm, self.at_once.max(1)))
+        Ok(VlmPlayer::of_journals(vlm, IN_FLIGHT))
     }
 
     /// Asks what the model supports, with the schema of an experiment and a frame of this size.
     pub fn probe(&self, experiment: &Spec, view: [u32; 2]) -> Result<ProbeAnswer, Failure> {
         let choice = self.choice()?;
-        let provider = self.provider(&choice)?;
+        let provider = self.provider(&choice, 1)?;
         Ok(network()?.block_on(probe(choice, &provider, experiment, view)))
     }
 
@@ -175,9 +167,6 @@ impl VlmArgs {
         if let Some(url) = &self.base_url {
             choice.backend.base_url = Some(url.clone());
         }
-        if self.prompt_only {
-            choice.model.contract = Contract::Prompt;
-        }
         if self.tier.is_some() {
             choice.use_flex_tier().map_err(Failure::input)?;
         }
@@ -187,7 +176,7 @@ impl VlmArgs {
         Ok(choice)
     }
 
-    fn provider(&self, choice: &Choice) -> Result<Provider, Failure> {
+    fn provider(&self, choice: &Choice, in_flight: usize) -> Result<Provider, Failure> {
         let Some(url) = &choice.backend.base_url else {
             return Err(Failure::input(format!("the backend of `{}` has no address; give --base-url", choice.name)));
         };
@@ -207,7 +196,7 @@ impl VlmArgs {
             interval: self.requests_per_minute.map_or(Duration::ZERO, |count| Duration::from_mins(1) / count),
             ..Patience::default()
         };
-        Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, self.at_once)
+        Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, in_flight)
             .map_err(Failure::input)
     }
 }
@@ -229,13 +218,13 @@ fn effort(text: &str) -> Result<Effort, String> {
 /// A model as a player.
 pub struct VlmPlayer {
     pub vlm: Arc<Vlm>,
-    at_once: usize,
+    in_flight: usize,
     network: Option<Runtime>,
 }
 
 impl VlmPlayer {
-    fn of_journals(vlm: Arc<Vlm>, at_once: usize) -> Self {
-        Self { vlm, at_once, network: None }
+    fn of_journals(vlm: Arc<Vlm>, in_flight: usize) -> Self {
+        Self { vlm, in_flight, network: None }
     }
 }
 
@@ -258,7 +247,7 @@ impl Player for VlmPlayer {
     }
 
     fn in_flight(&self) -> usize {
-        self.at_once
+        self.in_flight
     }
 
     fn resumes(&self) {

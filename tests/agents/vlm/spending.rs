@@ -4,7 +4,6 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use world::agent::LostKind;
-use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
 
@@ -19,7 +18,7 @@ use crate::harness::program::stderr;
 fn limits_stop_before_the_request_over_them() {
     let server = Server::start(|_, _| whole(Dialect::OpenaiChat, &decision("w")));
     let bench = Bench::new(Limits { requests: Some(2), ..Limits::default() });
-    let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
+    let vlm = bench.vlm(&server, Dialect::OpenaiChat);
     let replies = Bench::play(&vlm, "episode", 3);
     assert!(replies[0].is_ok() && replies[1].is_ok());
     let stopped = replies[2].as_ref().unwrap_err();

@@ -243,7 +243,7 @@ impl RecordArgs {
             return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
         }
         match self.agent.as_str() {
-            "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
+            "vlm" => Ok(Arc::new(self.vlm.player(&self.out, self.in_flight)?)),
             #[cfg(feature = "view")]
             HUMAN => {
                 let each = (self.seeds, self.repeats);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::journal::{Journal, JournalError, Recorded};
+use super::journal::{Journal, JournalError};
 use super::limits::Spend;
 use super::model::{Memory, Vlm, tokens};
 
@@ -50,9 +50,8 @@ impl Vlm {
             count += 1;
             steps.push(f64::from(u32::try_from(journal.answers().count()).unwrap_or(u32::MAX)));
             for recorded in journal.answers() {
-                let Recorded::Answer { body, latency_ms, .. } = recorded else { continue };
-                seconds.push(f64::from(*latency_ms) / 1e3);
-                let Some(answer) = self.read(body) else { continue };
+                seconds.push(f64::from(recorded.latency_ms) / 1e3);
+                let Some(answer) = self.read(&recorded.body) else { continue };
                 costs.extend(self.choice.cost_usd(&answer));
                 tokens.extend(answer.completion_tokens.map(f64::from));
             }
@@ -102,13 +101,12 @@ fn add_journal(vlm: &Vlm, journal: &Journal, spend: &mut Spend) {
         spend.add_unanswered(usd(at_most));
     }
     for recorded in journal.answers() {
-        let Recorded::Answer { body, at_most, .. } = recorded else { continue };
-        let answer = vlm.read(body);
+        let answer = vlm.read(&recorded.body);
         if let Some(answer) = &answer {
             vlm.learn_from(answer);
         }
         let cost = answer.as_ref().and_then(|answer| vlm.choice.cost_usd(answer));
-        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(*at_most));
+        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(recorded.at_most));
     }
 }
 

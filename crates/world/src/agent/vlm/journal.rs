@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::agent::Status;
 use crate::json_lines;
 use exact::budget::Limit;
 use exact::input;
@@ -58,7 +57,6 @@ pub enum Entry {
         attempt: u32,
         status: String,
         detail: String,
-        is_final: bool,
         /// The provider may have made an answer, and may bill it.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         may_be_paid: bool,
@@ -66,27 +64,13 @@ pub enum Entry {
     },
 }
 
+/// The answer to a step.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Recorded {
-    Answer {
-        question: String,
-        latency_ms: i32,
-        body: String,
-        at_most: Option<[u64; 2]>,
-    },
-    /// The step ended without an answer, with this status.
-    GivenUp {
-        question: String,
-        status: Status,
-    },
-}
-
-impl Recorded {
-    pub fn question(&self) -> &str {
-        match self {
-            Self::Answer { question, .. } | Self::GivenUp { question, .. } => question,
-        }
-    }
+pub struct Recorded {
+    pub question: String,
+    pub latency_ms: i32,
+    pub body: String,
+    pub at_most: Option<[u64; 2]>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -223,11 +207,7 @@ impl Journal {
                 let at_most = requests.at_most;
                 requests.note_outcome(false);
                 let (question, body) = (question.clone(), body.clone());
-                recorded.insert(*t, Recorded::Answer { question, latency_ms: *latency_ms, body, at_most });
-            }
-            Entry::Failure { t, status, is_final: true, question, .. } => {
-                let status = Status::named(status).unwrap_or(Status::ServerError);
-                recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
+                recorded.insert(*t, Recorded { question, latency_ms: *latency_ms, body, at_most });
             }
             Entry::Failure { may_be_paid, .. } => requests.note_outcome(*may_be_paid),
         }
@@ -239,7 +219,7 @@ mod tests {
     use std::fs;
     use std::path::{Path, PathBuf};
 
-    use super::{Entry, Journal, JournalError, Recorded};
+    use super::{Entry, Journal, JournalError};
 
     fn answer(t: i32) -> Entry {
         let (question, body) = (format!("question {t}"), format!("answer {t}"));
@@ -247,11 +227,7 @@ mod tests {
     }
 
     fn answered(journal: &Journal) -> Vec<String> {
-        let body = |recorded: &Recorded| match recorded {
-            Recorded::Answer { body, .. } => body.clone(),
-            Recorded::GivenUp { .. } => "none".to_owned(),
-        };
-        journal.answers().map(body).collect()
+        journal.answers().map(|recorded| recorded.body.clone()).collect()
     }
 
     fn with_lines(folder: &Path, count: i32) -> PathBuf {
@@ -289,7 +265,7 @@ mod tests {
         };
         let failure = |may_be_paid| {
             let (status, detail, question) = ("timeout".to_owned(), String::new(), String::new());
-            Entry::Failure { t: 1, attempt: 1, status, detail, is_final: false, may_be_paid, question }
+            Entry::Failure { t: 1, attempt: 1, status, detail, may_be_paid, question }
         };
         let entries = [
             [request(1), failure(false)],

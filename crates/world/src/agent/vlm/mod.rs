@@ -37,6 +37,6 @@ pub mod wire_format;
 
 pub use agent::VlmAgent;
 pub use answered::Typical;
-pub use model::{Memory, OnOutage, Vlm};
+pub use model::{Memory, Vlm};
 pub use provider::{Unreachable, concurrency, failure};
 pub use spending::{estimate, limits};

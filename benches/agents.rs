@@ -20,15 +20,15 @@ use std::time::{Duration, Instant};
 
 use tokio::runtime::Runtime;
 use trace::episode::{Action, Step};
+use world::agent::vlm::Vlm;
 use world::agent::vlm::limits::Account;
 use world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
 use world::agent::vlm::provider::{Patience, Provider};
 use world::agent::vlm::wire_format::Dialect;
-use world::agent::vlm::{OnOutage, Vlm};
 use world::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
+use world::record::lock::FolderLock;
 use world::record::metadata;
 use world::record::plan::{Key, Plan, Shard, Subject};
-use world::record::queue::Held;
 use world::record::run::{Progress, Recording, Settings};
 use world::record::shares::{Shares, Spent};
 use world::record::store::Store;
@@ -111,7 +111,7 @@ impl Behind {
         };
         let choice = Choice { name: "a second".into(), model, backend, is_known: true };
         let (handle, account) = (network.handle().clone(), Arc::<Account>::default());
-        let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account, OnOutage::Lose);
+        let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account);
         Self { vlm: Arc::new(vlm), _network: network }
     }
 }
@@ -186,19 +186,16 @@ impl Progress for Quiet {
     fn lost(&self, id: &str, reason: &str) {
         eprintln!("lost {id}: {reason}");
     }
-
-    fn waiting(&self, _: &str, _: &Held) {}
 }
 
 /// Steps per second of a recording, and where its time went.
 fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> (f64, Spent) {
     let subject = Subject::of(player.model());
-    let store = Store::open(
-        &folder.join("runs"),
+    let store = Store::new(
+        FolderLock::take(&folder.join("runs")).unwrap(),
         subject.clone(),
         metadata::Recordings::new(&[Experiment::E5], config, player, None, None),
-    )
-    .unwrap();
+    );
     let plan = Plan { experiments: vec![Experiment::E5], seeds: 1, runs: 64, repeats: 1, shard: Shard::WHOLE };
     let keys: Vec<Key> = plan.keys();
     let (shares, stop) = (Shares::default(), AtomicBool::new(false));

@@ -25,7 +25,7 @@ def reply(text):
 
 def serve(answer):
     """Serves `answer(at, path, headers, body, text)`: the number of the request from 1, and what it says; it gives the status,
-    headers and the body; of a GET there is no body, and of a body that is not JSON the text alone. `GET /` says how many requests came and how many were paid."""
+    headers and the body. A GET says how many requests came and how many were paid."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--latency", type=float, default=0.0, help="seconds for an answer")
@@ -40,18 +40,14 @@ def serve(answer):
                 count["requests"] += 1
                 at = count["requests"]
             time.sleep(typed.latency)
-            is_json = "json" in self.headers["content-type"]
-            status, headers, body = answer(at, self.path, self.headers, json.loads(text) if is_json else None, text)
+            status, headers, body = answer(at, self.path, self.headers, json.loads(text), text)
             data = (body if isinstance(body, str) else json.dumps(body)).encode()
             with lock:
                 count["paid"] += status == 200 and b'"usage' in data
             self.say(status, headers, data)
 
         def do_GET(self):
-            if self.path == "/":
-                return self.say(200, {}, json.dumps(count).encode())
-            status, headers, body = answer(0, self.path, self.headers, None, "")
-            self.say(status, headers, (body if isinstance(body, str) else json.dumps(body)).encode())
+            self.say(200, {}, json.dumps(count).encode())
 
         def say(self, status, headers, data):
             self.send_response(status)

@@ -79,9 +79,8 @@ pub fn cassette(data: &[u8]) {
     assert!(fs::read(&path).is_ok_and(|bytes| bytes == data), "a cassette is not written to");
     reached("played");
     for recorded in cassette.answers() {
-        let Recorded::Answer { body, .. } = recorded else { continue };
         for dialect in DIALECTS {
-            if let Ok(Some(answer)) = dialect.read(body) {
+            if let Ok(Some(answer)) = dialect.read(&recorded.body) {
                 text(&answer.text, answer.ending);
             }
         }

@@ -269,7 +269,6 @@ fn journal() -> Vec<u8> {
             attempt: 1,
             status: "timeout".into(),
             detail: "d".into(),
-            is_final: t == 3,
             may_be_paid: t == 2,
             question: question.clone(),
         };

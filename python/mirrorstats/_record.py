@@ -8,7 +8,7 @@ from typing import Any, Literal, Optional, Union
 
 from . import _native
 from ._answer import Recorded
-from ._error import ArgumentError, check_name, check_number
+from ._error import check_name, check_number
 from ._paths import Path, Spool, Toml, text, toml_file
 
 Message = dict[str, Any]
@@ -70,11 +70,6 @@ def record(
     check_name("images", images, ("path", "base64", "array"))
     check_name("on_error", on_error, ("raise", "lose"))
     _check_options(options)
-    if "at_once" in options and agent != "vlm":
-        raise ArgumentError(
-            "at_once: expected it with the agent 'vlm' alone, whose requests it counts\n"
-            "  help: `in_flight=N` is the number of episodes under way at once"
-        )
     spool = Spool()
     asked = {name.replace("_", "-"): _plain(value, spool) for name, value in options.items()}
     asked.update(experiment=toml_file(experiment, "experiment", spool), seeds=seeds, runs=runs, out=text(out, spool))

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use world::agent::Player;
 use world::agent::exec::Images;
 use world::agent::function::{Function, FunctionPlayer, Listener};
-use world::record::lock::parts_of;
+use world::record::lock::{FolderLock, parts_of};
 
 use crate::answer::{self, Answer};
 use crate::error;
@@ -100,11 +100,12 @@ pub fn record(py: Python<'_>, options: &str, agent: Option<PythonAgent>) -> PyRe
     let wrong = |failure: Failure| error::of_failure(&failure, "ArgumentError");
     let args: RecordArgs = cli::options_of("record", &options).map_err(wrong)?;
     let ending = Ending::default();
+    let lock = args.lock().map_err(failed)?;
     let player = match agent {
         Some(agent) => agent.player(&args, &ending),
         None => py.detach(|| args.player().map_err(failed))?,
     };
-    let recorded = py.detach(|| until_ended(&args, player.as_ref(), &ending))?;
+    let recorded = py.detach(|| until_ended(&args, lock, player.as_ref(), &ending))?;
     if let Some(raised) = ending.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
         return Err(raised);
     }
@@ -117,12 +118,17 @@ pub fn record(py: Python<'_>, options: &str, agent: Option<PythonAgent>) -> PyRe
 
 /// Records on another thread while this one watches for Ctrl-C, which only the main thread receives. The first Ctrl-C
 /// ends functions at once but completes other current steps; the second ends these too. Complete episodes stay.
-fn until_ended(args: &RecordArgs, player: &dyn Player, ending: &Ending) -> PyResult<Result<Recorded, Box<Failure>>> {
+fn until_ended(
+    args: &RecordArgs,
+    lock: FolderLock,
+    player: &dyn Player,
+    ending: &Ending,
+) -> PyResult<Result<Recorded, Box<Failure>>> {
     let (done, ended) = channel();
     thread::scope(|scope| {
         scope.spawn(move || {
             // The receiver waits until this is done.
-            let _ = done.send(args.record(player, &ending.stop).map_err(Box::new));
+            let _ = done.send(args.record(lock, player, &ending.stop).map_err(Box::new));
         });
         loop {
             match ended.recv_timeout(GLANCE) {

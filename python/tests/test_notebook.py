@@ -122,7 +122,6 @@ def test_an_argument_of_another_type_is_refused_by_its_name(paper, tmp_path):
     for ask, words in [
         (lambda: ms.open(paper, metrics=[]), "metrics: expected at least one name, found none"),
         (lambda: ms.import_steps([], cluster="seed", reconstruction=True), "exclude each other"),
-        (lambda: ms.record("frozen", at_once=3, out=tmp_path), "`in_flight=N` is the number of episodes under way"),
     ]:
         with pytest.raises(ms.ArgumentError, match=words):
             ask()

@@ -35,7 +35,7 @@ fn record(folder: &Path, images: Images, listeners: impl Fn() -> Listener + Send
         listeners: Arc::new(move || Ok(listeners())),
         stop: Arc::clone(&stop),
     });
-    args.record(&player, &stop).unwrap()
+    args.record(args.lock().unwrap(), &player, &stop).unwrap()
 }
 
 /// Walks, and replies `done` at its third step.

@@ -46,8 +46,6 @@ pub struct RecordAnswer {
     pub recorded: usize,
     /// Their steps.
     pub steps: u64,
-    /// Episodes that other processes recorded into the same folder meanwhile.
-    pub elsewhere: usize,
     /// Episodes of participants who declined or left: not played, or deleted.
     pub left_out: usize,
     /// The replies of this start.
@@ -127,10 +125,6 @@ pub(crate) fn say(recorded: &Recorded, folder: &Path, files: &[&Path]) -> io::Re
         0 => writeln!(out)?,
         found => writeln!(out, "; {found} of {} were there before", answer.asked)?,
     }
-    if answer.elsewhere > 0 {
-        let episodes = counted(answer.elsewhere as u64, "episode");
-        writeln!(out, "meanwhile, another process recorded {episodes} into the same folder")?;
-    }
     if answer.left_out > 0 {
         let episodes = counted(answer.left_out as u64, "episode");
         writeln!(
@@ -172,7 +166,7 @@ pub(crate) fn say(recorded: &Recorded, folder: &Path, files: &[&Path]) -> io::Re
             writeln!(out, "{words}, and plays {steps} of unfinished episodes again: this agent keeps no journal")?;
         }
         Some(words) => writeln!(out, "{words}")?,
-        None if answer.recorded + answer.found + answer.elsewhere == 0 => {}
+        None if answer.recorded + answer.found == 0 => {}
         None => writeln!(out, "next: {}", next(folder, files).join("\n      "))?,
     }
     Ok(())
@@ -194,7 +188,7 @@ fn next(folder: &Path, files: &[&Path]) -> Vec<String> {
 }
 
 fn stopped(answer: &RecordAnswer) -> Option<String> {
-    let ended = answer.found + answer.recorded + answer.elsewhere + answer.lost.len() + answer.left_out;
+    let ended = answer.found + answer.recorded + answer.lost.len() + answer.left_out;
     let left = answer.asked.saturating_sub(ended);
     let left = counted(left as u64, "episode");
     match answer.stopped_by_limit {

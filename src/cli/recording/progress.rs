@@ -11,12 +11,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::{spent, unreadable};
 use exact::escape::{visible, visible_lines};
-use exact::format::{counted, fixed};
+use exact::format::fixed;
 use trace::episode::Step;
 use world::agent::Player;
 use world::experiment::Experiment;
 use world::record::plan::{Key, Subject};
-use world::record::queue::Held;
 use world::record::replies::{Replies, RepliesAnswer};
 use world::record::run::Progress;
 use world::sim::config::WorldConfig;
@@ -67,7 +66,6 @@ pub(crate) struct Bar<'a> {
     known: Arc<AtomicBool>,
     is_shown: bool,
     told: Mutex<Instant>,
-    is_waiting: AtomicBool,
 }
 
 impl<'a> Bar<'a> {
@@ -92,22 +90,9 @@ impl<'a> Bar<'a> {
             let _ = out.write_str(&left.map_or_else(String::new, time_left));
         }));
         let told = Mutex::new(Instant::now());
-        let (is_waiting, replies, used) = (AtomicBool::new(false), Replies::default(), Mutex::default());
-        let bar = Self {
-            line,
-            player,
-            subject,
-            episodes,
-            planned,
-            ended,
-            replies,
-            budget,
-            used,
-            known,
-            is_shown,
-            told,
-            is_waiting,
-        };
+        let (replies, used) = (Replies::default(), Mutex::default());
+        let bar =
+            Self { line, player, subject, episodes, planned, ended, replies, budget, used, known, is_shown, told };
         bar.line.set_message(bar.message());
         bar
     }
@@ -193,50 +178,20 @@ impl Progress for Bar<'_> {
     fn lost(&self, id: &str, reason: &str) {
         self.say(&format!("lost {}: {}", visible(id), visible_lines(reason)));
     }
-
-    fn waiting(&self, id: &str, held: &Held) {
-        if !self.is_waiting.swap(true, Ordering::Relaxed) {
-            self.say(&waiting(id, held));
-        }
-    }
-}
-
-fn waiting(id: &str, held: &Held) -> String {
-    let others = match held.count - 1 {
-        0 => String::new(),
-        more => format!(" and {}", counted(more as u64, "other episode")),
-    };
-    let process = held.process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
-    format!(
-        "waiting for {}{others}: {process} records it into the same folder; press Ctrl-C to stop waiting",
-        visible(id)
-    )
 }
 
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
 
-    use super::{Bar, rate, time_left, waiting};
+    use super::{Bar, rate, time_left};
     use trace::episode::{Extra, Step};
     use world::agent::scripted::Scripted;
     use world::agent::{Player, exec};
     use world::experiment::Experiment;
     use world::record::plan::{Key, Subject};
-    use world::record::queue::Held;
     use world::record::run::Progress as _;
     use world::sim::config::WorldConfig;
-
-    #[test]
-    fn waiting_for_people_is_printed() {
-        let key = Key::first(Experiment::E1, 1, 3);
-        let one = Held { key, process: Some(4711), count: 1 };
-        let expected =
-            "waiting for E1/a/s1/r3: process 4711 records it into the same folder; press Ctrl-C to stop waiting";
-        assert_eq!(waiting("E1/a/s1/r3", &one), expected);
-        let more = waiting("E1/a/s1/r3", &Held { process: None, count: 3, ..one });
-        assert!(more.starts_with("waiting for E1/a/s1/r3 and 2 other episodes: another process records it"), "{more}");
-    }
 
     #[test]
     fn the_progress_counts_unreadable_replies() {

@@ -1,8 +1,8 @@
 //! A model behind a provider: its arguments and its player.
 
-use std::num::NonZeroU32;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
@@ -10,16 +10,22 @@ use tokio::runtime::Runtime;
 use crate::cli::{Failure, output};
 use exact::escape::visible;
 use trace::model_id::OWN_SERVER;
+use world::agent::vlm::Vlm;
 use world::agent::vlm::limits::{Account, Limits, Spend};
-use world::agent::vlm::models::{Choice, Contract, Models, ModelsError};
+use world::agent::vlm::models::{Choice, Models, ModelsError};
 use world::agent::vlm::probe::{ProbeAnswer, probe};
 use world::agent::vlm::provider::{Patience, Provider, check_transport};
 use world::agent::vlm::secrets::Secret;
 use world::agent::vlm::wire_format::{Dialect, Effort};
-use world::agent::vlm::{OnOutage, Tier, Vlm};
 use world::agent::{Agent, Lost, Player, Task};
 use world::experiment::Spec;
 use world::record::plan::slug;
+
+/// A service tier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Tier {
+    Flex,
+}
 
 /// A model, who serves it, and what a recording with it may spend.
 #[derive(Clone, Debug, clap::Args)]
@@ -42,9 +48,6 @@ pub struct VlmArgs {
     /// requested stops the recording
     #[arg(long, value_name = "ID")]
     accept_model: Vec<String>,
-    /// Ask for the reply's format in the prompt only; the provider does not enforce it
-    #[arg(long)]
-    prompt_only: bool,
     /// Stop before the model's cost in this folder, over all starts, exceeds this many US dollars; needs both prices of
     /// the model, or a router that reports the cost of an answer
     #[arg(long, value_name = "USD", value_parser = amount)]
@@ -63,34 +66,27 @@ pub struct VlmArgs {
     /// the file of models, else the provider's]
     #[arg(long, value_name = "EFFORT", value_parser = effort)]
     reasoning_effort: Option<Effort>,
-    /// The most concurrent requests; fewer if the provider reports too many
-    #[arg(long, value_name = "N", default_value_t = 64)]
-    at_once: usize,
-    /// The account's limit of requests per minute, over all processes that record into the folder [default: the limit
-    /// that the provider reports]
+    /// The account's limit of requests per minute [default: the limit that the provider reports]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub(crate) requests_per_minute: Option<u32>,
     /// Attempts for one step
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
-    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes; batch of OpenAI, Google
-    /// and Anthropic, which sends the current steps of all episodes as one batch
-    #[arg(long, value_name = "flex|batch", value_parser = tier)]
+    /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes
+    #[arg(long, value_name = "flex", value_enum)]
     tier: Option<Tier>,
     /// Seconds for one answer [default: 180, or 900 with --tier flex]
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=3_600))]
     timeout: Option<u64>,
-    /// If all attempts for a step fail, count a step without a decision instead of losing the episode
-    #[arg(long)]
-    stand_still_on_outage: bool,
     /// Replay the answers in an earlier recording's journals; nothing is sent
     #[arg(long, value_name = "DIR")]
     cassette: Option<PathBuf>,
 }
 
+/// Episodes in flight, and so requests, if --in-flight is absent; fewer if the provider reports too many.
+const IN_FLIGHT: usize = 64;
+
 const JOURNALS: &str = "journal";
-/// The folder of spending records, beside it.
-const LEDGERS: &str = "ledger";
 
 impl VlmArgs {
     pub fn name(&self) -> Option<&str> {
@@ -105,8 +101,8 @@ impl VlmArgs {
         }
     }
 
-    /// The player, with its journals in the recording's folder.
-    pub fn player(&self, out: &Path) -> Result<VlmPlayer, Failure> {
+    /// The player, with its journals in the recording's folder; it sends at most `in_flight` requests at once.
+    pub fn player(&self, out: &Path, in_flight: Option<NonZeroUsize>) -> Result<VlmPlayer, Failure> {
         let choice = self.choice()?;
         if let Some(folder) = &self.cassette {
             let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
@@ -118,37 +114,31 @@ impl VlmArgs {
             choice.check_prices().map_err(Failure::input)?;
         }
         let network = network()?;
-        let mut provider = self.provider(&choice)?;
-        if self.tier == Some(Tier::Batch) {
-            provider = provider.in_batches();
-        }
+        let provider = self.provider(&choice, in_flight.map_or(IN_FLIGHT, NonZeroUsize::get))?;
         let journals = out.join(JOURNALS);
         let slug = slug(&choice.name);
         let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
-        let ledger = Some(out.join(LEDGERS).join(format!("{slug}.json")));
-        let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
         let vlm = Vlm::online(
             choice,
             provider,
             network.handle().clone(),
             journals,
             Arc::new(Account::new(limits, Spend::default())),
-            on_outage,
         );
-        let (vlm, at_once, network) = (Arc::new(vlm), self.at_once.max(1), Some(network));
-        Ok(VlmPlayer { vlm, at_once, network, ledger, slug, has_counted: OnceLock::new() })
+        vlm.count_spent(&slug).map_err(Failure::input)?;
+        Ok(VlmPlayer { vlm: Arc::new(vlm), in_flight: IN_FLIGHT, network: Some(network) })
     }
 
     /// The player of a forecast: it reads the journals in the recording's folder, but has no key and sends no requests.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
-        Ok(VlmPlayer::of_journals(vlm, self.at_once.max(1)))
+        Ok(VlmPlayer::of_journals(vlm, IN_FLIGHT))
     }
 
     /// Asks what the model supports, with the schema of an experiment and a frame of this size.
     pub fn probe(&self, experiment: &Spec, view: [u32; 2]) -> Result<ProbeAnswer, Failure> {
         let choice = self.choice()?;
-        let provider = self.provider(&choice)?;
+        let provider = self.provider(&choice, 1)?;
         Ok(network()?.block_on(probe(choice, &provider, experiment, view)))
     }
 
@@ -177,11 +167,8 @@ impl VlmArgs {
         if let Some(url) = &self.base_url {
             choice.backend.base_url = Some(url.clone());
         }
-        if self.prompt_only {
-            choice.model.contract = Contract::Prompt;
-        }
-        if let Some(tier) = self.tier {
-            choice.use_tier(tier).map_err(Failure::input)?;
+        if self.tier.is_some() {
+            choice.use_flex_tier().map_err(Failure::input)?;
         }
         choice.model.accepted.clone_from(&self.accept_model);
         choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
@@ -189,7 +176,7 @@ impl VlmArgs {
         Ok(choice)
     }
 
-    fn provider(&self, choice: &Choice) -> Result<Provider, Failure> {
+    fn provider(&self, choice: &Choice, in_flight: usize) -> Result<Provider, Failure> {
         let Some(url) = &choice.backend.base_url else {
             return Err(Failure::input(format!("the backend of `{}` has no address; give --base-url", choice.name)));
         };
@@ -205,11 +192,11 @@ impl VlmArgs {
         }
         let patience = Patience {
             attempts: self.attempts,
-            timeout: Duration::from_secs(self.timeout.unwrap_or(if self.tier == Some(Tier::Flex) { 900 } else { 180 })),
+            timeout: Duration::from_secs(self.timeout.unwrap_or(if self.tier.is_some() { 900 } else { 180 })),
             interval: self.requests_per_minute.map_or(Duration::ZERO, |count| Duration::from_mins(1) / count),
             ..Patience::default()
         };
-        Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, self.at_once)
+        Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, in_flight)
             .map_err(Failure::input)
     }
 }
@@ -224,14 +211,6 @@ fn amount(text: &str) -> Result<f64, String> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
 }
 
-fn tier(text: &str) -> Result<Tier, String> {
-    match text {
-        "flex" => Ok(Tier::Flex),
-        "batch" => Ok(Tier::Batch),
-        _ => Err("expected flex or batch".to_owned()),
-    }
-}
-
 fn effort(text: &str) -> Result<Effort, String> {
     Effort::named(text).ok_or_else(|| format!("expected one of {}", Effort::ALL.map(Effort::name).join(", ")))
 }
@@ -239,17 +218,13 @@ fn effort(text: &str) -> Result<Effort, String> {
 /// A model as a player.
 pub struct VlmPlayer {
     pub vlm: Arc<Vlm>,
-    at_once: usize,
+    in_flight: usize,
     network: Option<Runtime>,
-    ledger: Option<PathBuf>,
-    slug: String,
-    /// Set once the journals have been read.
-    has_counted: OnceLock<()>,
 }
 
 impl VlmPlayer {
-    fn of_journals(vlm: Arc<Vlm>, at_once: usize) -> Self {
-        Self { vlm, at_once, network: None, ledger: None, slug: String::new(), has_counted: OnceLock::new() }
+    fn of_journals(vlm: Arc<Vlm>, in_flight: usize) -> Self {
+        Self { vlm, in_flight, network: None }
     }
 }
 
@@ -272,7 +247,7 @@ impl Player for VlmPlayer {
     }
 
     fn in_flight(&self) -> usize {
-        self.at_once
+        self.in_flight
     }
 
     fn resumes(&self) {
@@ -284,18 +259,11 @@ impl Player for VlmPlayer {
     }
 
     fn spend(&self) -> Option<Spend> {
-        self.network.as_ref()?;
-        if self.has_counted.set(()).is_ok() {
-            self.vlm.count_spent(&self.slug).ok()?;
-        }
-        Some(self.vlm.spend())
+        self.network.as_ref().map(|_| self.vlm.spend())
     }
 
     fn check(&self) -> Result<(), String> {
-        self.vlm.connect().map_err(|fault| fault.to_string())?;
-        let _ = self.has_counted.set(());
-        let share = |path| self.vlm.share_account(path, &self.slug).map_err(|fault| fault.to_string());
-        self.ledger.as_deref().map_or(Ok(()), share)
+        self.vlm.connect().map_err(|fault| fault.to_string())
     }
 
     fn stopped(&self) -> Option<String> {

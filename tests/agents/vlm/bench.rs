@@ -7,12 +7,12 @@ use std::time::Duration;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 use trace::frame::Frame;
+use world::agent::vlm::Vlm;
 use world::agent::vlm::limits::{Account, Limits, Spend};
 use world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
 use world::agent::vlm::provider::{Patience, Provider};
 use world::agent::vlm::secrets::Secret;
 use world::agent::vlm::wire_format::Dialect;
-use world::agent::vlm::{OnOutage, Vlm};
 use world::agent::{Agent as _, Lost, Observation, Reply, Task};
 use world::experiment::Experiment;
 use world::experiment::spec::Stated;
@@ -76,21 +76,21 @@ impl Bench {
         Self { folder: tempfile::tempdir().unwrap(), network, account }
     }
 
-    pub fn vlm(&self, server: &Server, dialect: Dialect, on_outage: OnOutage) -> Arc<Vlm> {
-        self.vlm_with(server, dialect, on_outage, patience())
+    pub fn vlm(&self, server: &Server, dialect: Dialect) -> Arc<Vlm> {
+        self.vlm_with(server, dialect, patience())
     }
 
-    pub fn vlm_with(&self, server: &Server, dialect: Dialect, on_outage: OnOutage, patience: Patience) -> Arc<Vlm> {
-        self.vlm_of(server, choice(dialect), on_outage, patience)
+    pub fn vlm_with(&self, server: &Server, dialect: Dialect, patience: Patience) -> Arc<Vlm> {
+        self.vlm_of(server, choice(dialect), patience)
     }
 
-    pub fn vlm_of(&self, server: &Server, choice: Choice, on_outage: OnOutage, patience: Patience) -> Arc<Vlm> {
+    pub fn vlm_of(&self, server: &Server, choice: Choice, patience: Patience) -> Arc<Vlm> {
         let dialect = choice.backend.dialect;
         let secret = Some(Secret::new(KEY.to_owned()));
         let provider = Provider::new(&server.address, dialect, &choice.model.id, secret, patience, 4).unwrap();
         let (handle, folder) = (self.network.handle().clone(), self.folder.path().to_owned());
         let account = Arc::clone(&self.account);
-        Arc::new(Vlm::online(choice, provider, handle, folder, account, on_outage))
+        Arc::new(Vlm::online(choice, provider, handle, folder, account))
     }
 
     /// The replies to the first `steps` steps of an episode.

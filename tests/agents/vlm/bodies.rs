@@ -6,7 +6,6 @@ use std::num::NonZeroU32;
 use serde_json::{Value, json};
 use world::agent::prompt::{Prompt, Rendered};
 use world::agent::reply;
-use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::{Dialect, Effort};
 use world::experiment::{Experiment, built_in_names};
@@ -71,7 +70,7 @@ fn built_in() -> Vec<Experiment> {
 fn body(dialect: Dialect, experiment: &Experiment) -> (Value, Rendered) {
     let server = Server::start(move |_, _| whole(dialect, &decision("w")));
     let bench = Bench::new(Limits::default());
-    let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+    let vlm = bench.vlm(&server, dialect);
     Bench::play_task(&vlm, task(experiment.clone()), "episode", 1).remove(0).unwrap();
     let words = Prompt::of(experiment).unwrap().render(&task(experiment.clone()), &observation(1)).unwrap();
     (server.requests().remove(0).json(), words)
@@ -141,7 +140,7 @@ fn token_limit_and_reasoning_have_each_providers_parameters() {
         id.clone_into(&mut choice.model.id);
         choice.model.answers_as = vec!["*".to_owned()];
         (choice.model.max_output_tokens, choice.model.reasoning_effort) = (NonZeroU32::new(9_000), effort);
-        let vlm = bench.vlm_of(&server, choice, OnOutage::Lose, patience());
+        let vlm = bench.vlm_of(&server, choice, patience());
         Bench::play(&vlm, "episode", 1).remove(0).unwrap();
         (server.requests().remove(0).json(), vlm.description())
     };

@@ -6,7 +6,6 @@ use std::process::Output;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::{STANDARD, URL_SAFE_NO_PAD};
-use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
 
@@ -24,7 +23,7 @@ fn keys_are_in_no_file_and_no_message() {
         _ => http("401 Unauthorized", JSON, echo.as_bytes()),
     });
     let bench = Bench::new(Limits::default());
-    let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
+    let vlm = bench.vlm(&server, Dialect::OpenaiChat);
     let replies = Bench::play(&vlm, "episode", 2);
     assert_eq!(replies[0].as_ref().unwrap().words.view_description.as_deref(), Some("[key]"));
     let refused = replies[1].as_ref().unwrap_err();
@@ -106,7 +105,7 @@ fn a_key_in_another_form_is_not_printed_or_stored() {
             _ => http("401 Unauthorized", JSON, echo.as_bytes()),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
+        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
         let replies = Bench::play(&vlm, "episode", 2);
         let told = format!("{replies:?}{}", bench.written());
         assert!(!told.contains(form) && told.contains("[key]"), "{form}: {told}");

@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 use trace::episode::Action;
-use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
 use world::agent::{Status, reply};
@@ -27,7 +26,7 @@ fn each_provider_gets_its_own_wire_format() {
     for (dialect, path, key) in providers {
         let server = Server::start(move |_, _| whole(dialect, &decision("w")));
         let bench = Bench::new(Limits::default());
-        let reply = Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 1).remove(0).unwrap();
+        let reply = Bench::play(&bench.vlm(&server, dialect), "episode", 1).remove(0).unwrap();
         assert_eq!((reply.status, reply.action), (Status::Ok, Some(Action::MoveForward)), "{dialect:?}");
         assert_eq!((reply.usage.prompt_tokens, reply.usage.completion_tokens), (Some(1000), Some(100)), "{dialect:?}");
         let request = server.requests().remove(0);

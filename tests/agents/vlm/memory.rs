@@ -4,10 +4,10 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use trace::episode::Action;
+use world::agent::vlm::Vlm;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::models::Model;
 use world::agent::vlm::wire_format::{Dialect, Effort};
-use world::agent::vlm::{OnOutage, Vlm};
 
 use super::bench::{Bench, choice};
 use super::server::{Server, decision, http, whole};
@@ -19,10 +19,8 @@ fn answers_are_reused_and_play_without_a_network() {
         _ => whole(Dialect::OpenaiChat, &decision(if at % 2 == 0 { "a" } else { "w" })),
     });
     let bench = Bench::new(Limits::default());
-    let first: Vec<_> = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 3)
-        .into_iter()
-        .map(Result::unwrap)
-        .collect();
+    let first: Vec<_> =
+        Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 3).into_iter().map(Result::unwrap).collect();
     assert_eq!(server.count(), 4);
     assert_eq!(first[0].action, Some(Action::TurnLeft));
     assert!((first[0].usage.cost_usd.unwrap() - 0.002).abs() < 1e-12);
@@ -32,7 +30,7 @@ fn answers_are_reused_and_play_without_a_network() {
     let mut text = std::fs::read_to_string(&journal).unwrap();
     text.push_str("{\"kind\":\"answer\",\"t\":4,\"att");
     std::fs::write(&journal, text).unwrap();
-    let again = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 3);
+    let again = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 3);
     assert_eq!(again.into_iter().map(Result::unwrap).collect::<Vec<_>>(), first);
     assert_eq!(server.count(), 4, "nothing is asked again");
 
@@ -60,7 +58,7 @@ fn the_model_that_answered_is_kept_as_the_provider_names_it() {
     for dialect in [Dialect::OpenaiChat, Dialect::Gemini, Dialect::AnthropicMessages] {
         let server = Server::start(move |_, _| whole(dialect, &decision("w")));
         let bench = Bench::new(Limits::default());
-        assert!(Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 1)[0].is_ok());
+        assert!(Bench::play(&bench.vlm(&server, dialect), "episode", 1)[0].is_ok());
         let answer: serde_json::Value = serde_json::from_str(bench.written().lines().nth(1).unwrap()).unwrap();
         assert_eq!(answer["model"], "model-1-0601", "{dialect:?}");
     }

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use world::agent::Status;
 use world::agent::reply::Repair;
-use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
 use world::record::fingerprint::Fingerprint;
@@ -44,7 +43,7 @@ fn a_whole_answer_counts_whatever_its_content_type_says() {
             let body = spoken(dialect, &decision("w"), endings(dialect).0).to_string();
             let server = Server::start(move |_, _| http("200 OK", headers, body.as_bytes()));
             let bench = Bench::new(Limits::default());
-            let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+            let vlm = bench.vlm(&server, dialect);
             let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
             assert_eq!((reply.status, server.count()), (Status::Ok, 1), "{dialect:?} {headers:?}");
             assert!(reply.usage.cost_usd.is_some_and(|cost| cost > 0.0), "{dialect:?} {headers:?}");
@@ -65,7 +64,7 @@ fn waiting_for_a_rate_limit_uses_no_attempts() {
         });
         let bench = Bench::new(Limits::default());
         let start = Instant::now();
-        let reply = Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 1).remove(0).unwrap();
+        let reply = Bench::play(&bench.vlm(&server, dialect), "episode", 1).remove(0).unwrap();
         assert_eq!((reply.status, server.count()), (Status::Ok, 9), "{dialect:?}");
         assert!(start.elapsed() >= Duration::from_millis(160), "{dialect:?}: asked too early");
     }
@@ -78,7 +77,7 @@ fn a_daily_quota_stops_the_recording_with_a_remedy() {
     for answer in answers {
         let server = Server::start(move |_, _| answer.clone());
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::Gemini, OnOutage::StandStill);
+        let vlm = bench.vlm(&server, Dialect::Gemini);
         let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
         assert!(lost.contains("quota of the day is used up") && lost.contains("\n  help: "), "{lost}");
         assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
@@ -91,7 +90,7 @@ fn a_wait_of_hours_stops_the_recording_with_a_remedy() {
         let answer = http("429 Too Many Requests", &format!("retry-after: {wait}\r\n"), b"slow down");
         let server = Server::start(move |_, _| answer.clone());
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
+        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
         let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
         assert!(lost.contains("asks to wait") && lost.contains(seconds) && lost.contains("\n  help: "), "{lost}");
         assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
@@ -107,7 +106,7 @@ fn no_request_goes_out_before_a_used_up_limit_is_renewed() {
     let server = Server::start(move |_, _| http("200 OK", headers, body.as_bytes()));
     let bench = Bench::new(Limits::default());
     let start = Instant::now();
-    let replies = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 3);
+    let replies = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 3);
     assert!(replies.iter().all(|reply| reply.as_ref().is_ok_and(|reply| reply.status == Status::Ok)));
     assert_eq!(server.count(), 3);
     assert!(start.elapsed() >= Duration::from_millis(200), "the provider was asked too early");
@@ -135,7 +134,7 @@ fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
         let bench = Bench::new(Limits::default());
         // The second reply comes from the journal.
         for _ in 0..2 {
-            let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+            let vlm = bench.vlm(&server, dialect);
             let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
             assert_eq!((reply.status, reply.repairs), (Status::Repaired, vec![Repair::ToolCall]), "{dialect:?}");
             assert_eq!(reply.self_color.as_deref(), Some("red"), "{dialect:?}");
@@ -158,7 +157,7 @@ fn arguments_as_an_object_and_the_older_form_of_a_call_are_taken() {
         let body = json!({ "choices": [{ "finish_reason": "stop", "message": message }], "usage": usage });
         let server = Server::start(move |_, _| ok(&body));
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
+        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
         let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
         assert_eq!((reply.status, reply.repairs), (Status::Repaired, vec![Repair::ToolCall]), "{shown}");
         assert_eq!((reply.usage.prompt_tokens, reply.usage.completion_tokens), (Some(100), Some(5)), "{shown}");
@@ -304,7 +303,7 @@ fn extra_body_is_sent_and_fingerprinted_and_the_default_temperature_is_not_sent(
         let mut choice = choice(dialect);
         choice.model.temperature = temperature;
         choice.model.extra_body = extra.as_object().unwrap().clone();
-        let vlm = bench.vlm_of(&server, choice, OnOutage::Lose, patience());
+        let vlm = bench.vlm_of(&server, choice, patience());
         Bench::play(&vlm, "episode", 1).remove(0).unwrap();
         let recording = json!({ "agent": vlm.description() });
         (
@@ -351,7 +350,7 @@ fn tokens_from_a_cache_have_their_price_with_every_provider() {
         }
         let server = Server::start(move |_, _| ok(&body));
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+        let vlm = bench.vlm(&server, dialect);
         let usage = Bench::play(&vlm, "episode", 1).remove(0).unwrap().usage;
         assert_eq!(usage.prompt_tokens, Some(1_000), "{dialect:?}");
         // The bench's prices per million tokens: 1 dollar, cached 0.1, replies 10.

@@ -4,7 +4,6 @@ use std::net::TcpListener;
 
 use serde_json::json;
 use world::agent::LostKind;
-use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
 
@@ -71,7 +70,7 @@ fn refused_images_are_a_failure_not_an_outage() {
         _ => http("500 Internal Server Error", JSON, br#"{"error":"this model does not support images"}"#),
     });
     let bench = Bench::new(Limits::default());
-    let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
+    let vlm = bench.vlm(&server, Dialect::OpenaiChat);
     let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err();
     assert!(lost.cause.contains("takes no images") && lost.kind == LostKind::Failure, "{lost}");
     assert_eq!((vlm.stopped(), server.count()), (Some(lost.cause.as_str()), 2));

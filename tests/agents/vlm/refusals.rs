@@ -3,9 +3,9 @@
 use std::fs;
 
 use serde_json::{Value, json};
+use world::agent::vlm::Vlm;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
-use world::agent::vlm::{OnOutage, Vlm};
 use world::agent::{Lost, Reply, Status};
 
 use super::bench::{Bench, KEY, choice};
@@ -53,14 +53,14 @@ fn a_bad_request_that_refuses_costs_one_step_and_replays() {
             _ => whole(dialect, &decision("w")),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+        let vlm = bench.vlm(&server, dialect);
         let replies = Bench::play(&vlm, "episode", 3);
         assert_eq!(statuses(&replies), [Status::Ok, Status::Refusal, Status::Ok], "{dialect:?}");
         assert_eq!((server.count(), vlm.stopped()), (3, None), "{dialect:?}");
         let refused = replies[1].as_ref().unwrap();
         assert_eq!((refused.action, &refused.self_color, refused.usage.cost_usd), (None, &None, None));
 
-        let again = Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 3);
+        let again = Bench::play(&bench.vlm(&server, dialect), "episode", 3);
         let cassette = Vlm::cassette(choice(dialect), bench.folder.path().to_owned());
         assert_eq!(again, replies, "{dialect:?}");
         assert_eq!(Bench::play(&cassette.into(), "episode", 3), replies, "{dialect:?}");
@@ -90,7 +90,7 @@ fn refusals_are_known_in_all_their_forms() {
     for (name, dialect, answer) in cases {
         let server = Server::start(move |_, _| answer.clone());
         let bench = Bench::new(Limits::default());
-        let replies = Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 1);
+        let replies = Bench::play(&bench.vlm(&server, dialect), "episode", 1);
         assert_eq!(replies[0].as_ref().map(|reply| reply.status), Ok(Status::Refusal), "{name}");
         assert_eq!(server.count(), 1, "{name}");
     }
@@ -104,7 +104,7 @@ fn a_bad_request_after_an_answer_costs_its_episode_alone() {
             _ => whole(dialect, &decision("w")),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
+        let vlm = bench.vlm(&server, dialect);
         let lost = Bench::play(&vlm, "long", 2).remove(1).unwrap_err();
         assert_eq!(lost.status, None);
         assert!(lost.cause.starts_with("step 2: the provider rejects this request: HTTP 400"), "{lost}");
@@ -113,7 +113,7 @@ fn a_bad_request_after_an_answer_costs_its_episode_alone() {
         assert_eq!(statuses(&Bench::play(&vlm, "short", 1)), [Status::Ok], "{dialect:?}");
 
         // A restart knows from the journal that the model has answered.
-        let again = bench.vlm(&server, dialect, OnOutage::StandStill);
+        let again = bench.vlm(&server, dialect);
         let replies = Bench::play(&again, "long", 2);
         assert!(replies[0].is_ok() && replies[1].is_err(), "{dialect:?}");
         assert_eq!((server.count(), again.stopped()), (4, None), "{dialect:?}");
@@ -128,7 +128,7 @@ fn a_key_or_a_model_that_is_refused_stops_everything_at_any_time() {
             _ => http(status, JSON, br#"{"error": {"message": "no", "code": "denied"}}"#),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
+        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
         let lost = Bench::play(&vlm, "episode", 3).remove(2).unwrap_err();
         assert!(lost.cause.starts_with(&format!("the provider refuses the request: HTTP {status}")), "{lost}");
         assert_eq!((vlm.stopped(), server.count()), (Some(lost.cause.as_str()), 2));

@@ -5,7 +5,6 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 use world::agent::Status;
 use world::agent::reply::Repair;
-use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::provider::Patience;
 use world::agent::vlm::wire_format::Dialect;
@@ -24,17 +23,22 @@ fn check(dialect: Dialect, cases: Vec<Case>) {
     let bench = Bench::new(Limits::default());
     for (name, answer, status) in cases {
         let server = Server::start(move |_, _| answer.clone());
-        let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
+        let vlm = bench.vlm(&server, dialect);
         let place = format!("{name}, {dialect:?}");
         let reply = Bench::play(&vlm, &place.replace([' ', ','], "-"), 1).remove(0);
-        let reply = reply.unwrap_or_else(|lost| panic!("{place}: {lost}"));
-        assert_eq!(reply.status, status, "{place}");
-        let repairs = Repair::joined(&reply.repairs);
-        assert_eq!(repairs.as_deref(), (status == Status::Repaired).then_some("code_fence"), "{place}");
-        let has_decision = matches!(status, Status::Ok | Status::Repaired);
-        assert_eq!(reply.action.is_some(), has_decision, "{place}");
-        assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{place}");
         let is_outage = matches!(status, Status::ServerError | Status::Timeout);
+        if is_outage || status == Status::RateLimited {
+            assert_eq!(reply.unwrap_err().status, Some(status), "{place}");
+            assert_eq!(vlm.stopped(), None, "{place}");
+        } else {
+            let reply = reply.unwrap_or_else(|lost| panic!("{place}: {lost}"));
+            assert_eq!(reply.status, status, "{place}");
+            let repairs = Repair::joined(&reply.repairs);
+            assert_eq!(repairs.as_deref(), (status == Status::Repaired).then_some("code_fence"), "{place}");
+            let has_decision = matches!(status, Status::Ok | Status::Repaired);
+            assert_eq!(reply.action.is_some(), has_decision, "{place}");
+            assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{place}");
+        }
         match status {
             // A busy provider gets more requests than the limit on attempts.
             Status::RateLimited => assert!(server.count() > 3, "{place}: {}", server.count()),
@@ -82,7 +86,7 @@ fn a_lone_surrogate_in_an_answer_is_a_repair_with_every_provider() {
             let answer = http("200 OK", JSON, body.replace("HERE", escape).as_bytes());
             let bench = Bench::new(Limits::default());
             let server = Server::start(move |_, _| answer.clone());
-            let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
+            let vlm = bench.vlm(&server, dialect);
             // The second reply comes from the journal.
             for _ in 0..2 {
                 let reply = Bench::play(&vlm, "E1-m-s1-r1", 1).remove(0).unwrap();
@@ -245,7 +249,7 @@ fn permanent_refusals_end_the_run_at_once() {
         for dialect in PROVIDERS {
             let server = Server::start(move |_, _| http(status, "", body));
             let bench = Bench::new(Limits::default());
-            let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
+            let vlm = bench.vlm(&server, dialect);
             let replies = Bench::play(&vlm, "episode", 2);
             let reasons: Vec<_> = replies.into_iter().map(|reply| reply.unwrap_err().cause).collect();
             let sentence = format!("the provider refuses the request: HTTP {status}");
@@ -266,7 +270,7 @@ fn a_redirect_is_not_followed() {
         let location = format!("location: {address}/chat/completions\r\n");
         let server = Server::start(move |_, _| http(status, &location, b""));
         let bench = Bench::new(Limits::default());
-        let lost = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 1).remove(0);
+        let lost = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 1).remove(0);
         assert!(lost.unwrap_err().cause.contains(status));
         assert!(server.requests()[0].head.contains(KEY));
     }
@@ -286,10 +290,9 @@ fn an_answer_that_takes_too_long_is_a_timeout_wherever_it_hangs() {
     for (name, conduct) in slow {
         let server = Server::start(move |_, _| conduct.clone());
         let bench = Bench::new(Limits::default());
-        let vlm = |on_outage| bench.vlm_with(&server, Dialect::OpenaiChat, on_outage, impatient);
-        let reply = Bench::play(&vlm(OnOutage::StandStill), "stands", 1).remove(0).unwrap();
-        assert_eq!(reply.status, Status::Timeout, "{name}");
-        let lost = Bench::play(&vlm(OnOutage::Lose), "lost", 1).remove(0).unwrap_err();
+        let vlm = bench.vlm_with(&server, Dialect::OpenaiChat, impatient);
+        let lost = Bench::play(&vlm, "lost", 1).remove(0).unwrap_err();
+        assert_eq!(lost.status, Some(Status::Timeout), "{name}");
         assert!(lost.cause.starts_with("step 1: timeout after 2 attempts"), "{name}: {lost}");
     }
 }
@@ -299,7 +302,7 @@ fn slow_bytes_in_time_are_an_answer() {
     let server =
         Server::start(|_, _| Conduct::dripping(whole(Dialect::Gemini, &decision("w")), 16, Duration::from_millis(1)));
     let bench = Bench::new(Limits::default());
-    let reply = Bench::play(&bench.vlm(&server, Dialect::Gemini, OnOutage::Lose), "episode", 1).remove(0).unwrap();
+    let reply = Bench::play(&bench.vlm(&server, Dialect::Gemini), "episode", 1).remove(0).unwrap();
     assert_eq!((reply.status, server.count()), (Status::Ok, 1));
 }
 
@@ -311,7 +314,7 @@ fn retry_after_is_respected() {
     });
     let bench = Bench::new(Limits::default());
     let patience = Patience { longest_wait: Duration::from_secs(5), ..patience() };
-    let vlm = bench.vlm_with(&server, Dialect::AnthropicMessages, OnOutage::Lose, patience);
+    let vlm = bench.vlm_with(&server, Dialect::AnthropicMessages, patience);
     let start = Instant::now();
     assert_eq!(Bench::play(&vlm, "episode", 1).remove(0).unwrap().status, Status::Ok);
     assert!(start.elapsed() >= Duration::from_secs(1), "the provider would have been asked too early");

@@ -1,5 +1,5 @@
-//! Processes that record into one folder or read it, killed at any moment. The folder never gets stuck, no episode is
-//! lost or recorded twice, and readers see a complete state or say what is missing.
+//! Processes that record into one folder or read it, killed at any moment. One at a time records and others are refused;
+//! the folder never gets stuck, no episode is lost, and readers see a complete state or say what is missing.
 
 use std::fs;
 use std::path::Path;
@@ -128,6 +128,7 @@ impl Bench {
         assert!(!said.contains("panicked"), "{told}");
         match (code, reads) {
             (-1 | 0, _) => {}
+            (2, false) => assert!(said.starts_with("error: another process records into `runs`"), "{told}"),
             // There is no recording yet, or listed files have been replaced meanwhile.
             (2, true) => assert!(said.contains("error: ") && !said.contains("damaged"), "{told}"),
             _ => panic!("{told}"),

@@ -96,7 +96,7 @@ fn files_of_a_killed_recording_are_removed() {
     let whole = bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
     let parts = bench.path("runs").join(".parts");
     std::fs::create_dir(&parts).unwrap();
-    for name in [".mirrorstats-abc", "E1-random-s1-r2.mcap.unfinished", "E1-random-s1-r2.mcap"] {
+    for name in [".mirrorstats-abc", "E1-random-s1-r2.mcap"] {
         std::fs::write(parts.join(name), "half of somethi").unwrap();
     }
     assert_same(&bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1"), &whole);

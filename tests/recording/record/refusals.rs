@@ -108,8 +108,8 @@ fn a_recording_without_a_palette_is_of_another_version() {
     });
     let before = bench.files("runs");
     let expected = [
-        "`runs/E1-random.parquet` is a recording of version 1, but this mirrorstats records version 3",
-        "help: continue with the mirrorstats that began it, or record into another folder",
+        "`runs/E1-random.parquet` was recorded with another version: expected 3, found 1",
+        "help: record into another folder",
     ];
     refused(&bench, "runs", &words.replace("--runs 1", "--runs 2"), &expected);
     assert_same(&bench.files("runs"), &before);

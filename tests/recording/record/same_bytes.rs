@@ -27,27 +27,13 @@ fn repeats_and_any_number_of_threads_give_the_same_bytes() {
 }
 
 #[test]
-fn shards_and_simultaneous_processes_give_the_same_bytes() {
+fn shards_give_the_same_bytes() {
     let bench = Bench::new();
     let whole = bench.recorded("whole", WHOLE);
     for share in ["3/3", "1/3", "2/3"] {
         succeeds(&mut bench.record("shares", &format!("{WHOLE} --threads 1 --shard {share}")));
     }
     assert_same(&bench.files("shares"), &whole);
-
-    let mut at_once: Vec<_> = (1..=4)
-        .map(|at| {
-            bench
-                .record("at-once", &format!("{WHOLE} --threads 1 --shard {at}/4"))
-                .stderr(std::process::Stdio::null())
-                .spawn()
-                .unwrap()
-        })
-        .collect();
-    for child in &mut at_once {
-        assert!(child.wait().unwrap().success());
-    }
-    assert_same(&bench.files("at-once"), &whole);
 }
 
 #[test]

@@ -1,13 +1,20 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::metadata::{Difference, VERSION_KEY};
+use super::metadata::Difference;
 use crate::agent::Lost;
 use trace::error::TraceError;
 use trace::log::LogError;
 
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
+    #[error(
+        "another process records into `{}`\n  \
+         help: wait for its end, or give each process its own --out, with --shard to divide the episodes; `record \
+         study.toml` records several models in one process",
+        folder.display()
+    )]
+    Busy { folder: PathBuf },
     #[error("cannot {doing} `{}`: {source}\n  help: is the folder writable, and the disk not full?", path.display())]
     Io { doing: &'static str, path: PathBuf, source: io::Error },
     #[error(
@@ -23,12 +30,6 @@ pub enum StoreError {
         path.display()
     )]
     Files { path: PathBuf, expected: String, found: String },
-    #[error(
-        "`{}` is a recording of version {found}, but this mirrorstats records version {expected}\n  \
-         help: continue with the mirrorstats that began it, or record into another folder",
-        path.display()
-    )]
-    Version { path: PathBuf, expected: String, found: String },
     #[error("the log `{}` does not belong to this recording: {fault}\n  help: {help}", path.display())]
     ForeignLog { path: PathBuf, fault: String, help: String },
     #[error(
@@ -47,11 +48,10 @@ pub enum StoreError {
 impl StoreError {
     pub(super) fn different(path: &Path, Difference { what, expected, found }: Difference) -> Self {
         let path = path.to_owned();
-        match what.as_str() {
-            VERSION_KEY if found.parse::<u64>().is_ok() => Self::Version { path, expected, found },
-            "agent.files" => Self::Files { path, expected, found },
-            _ => Self::Different { path, what, expected, found },
+        if what == "agent.files" {
+            return Self::Files { path, expected, found };
         }
+        Self::Different { path, what, expected, found }
     }
 
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {

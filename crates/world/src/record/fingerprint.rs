@@ -48,7 +48,7 @@ impl Fingerprint {
             "sampling": (!sampling.is_empty()).then(|| hash_of(&Value::Object(sampling))),
             "model": model,
         });
-        // Absent, not null: agents without frames, and older recordings, have no such part in their fingerprints.
+        // Absent, not null: agents without frames have no such part in their fingerprints.
         if let Some(renderer) = renderer {
             parts["renderer"] = json!(renderer);
         }
@@ -131,7 +131,6 @@ mod tests {
         assert!(unseen.id != one.id && one.id != other.id);
         assert_eq!(unseen.parts.get("renderer"), None);
         assert_eq!(other.parts["renderer"]["processor"], "x86_64 limited to sse2");
-        // As in older recordings: a missing part is absent, not null.
         assert_eq!(unseen.parts.as_object().unwrap().len(), 6);
     }
 

@@ -16,10 +16,7 @@ pub(super) const SEEDS: &str = "seeds";
 /// A key that grows with the recorded episodes: their settings, by fingerprint.
 pub(super) const FINGERPRINTS: &str = "fingerprints";
 
-pub(super) const VERSION_KEY: &str = "version";
-
-/// The version of this object's shape: 2 adds a palette, a design and fingerprints, 3 the whole experiment. A recording
-/// of another version is not continued, since its episodes were compared by other rules.
+/// The version of this object's shape.
 const VERSION: u32 = 3;
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -56,7 +53,7 @@ fn recording(
 ) -> Value {
     let config = &config.of(experiment);
     let mut recording = json!({
-        VERSION_KEY: VERSION,
+        "version": VERSION,
         "kind": "recording",
         "design": { "pairs": "scene", "cluster": null },
         "condition": condition.unwrap_or("default"),

@@ -15,7 +15,7 @@ pub mod fingerprint;
 mod folder;
 pub mod metadata;
 pub mod plan;
-pub mod queue;
+mod queue;
 pub mod replies;
 pub mod rollout;
 pub mod run;

@@ -15,9 +15,8 @@ use futures_util::stream::{FuturesUnordered, StreamExt as _};
 use super::error::RecordError;
 use super::eyes::Eyes;
 use super::failures::{LostEpisode, lost_episode};
-use super::lock::EpisodeLock;
 use super::plan::{Key, Subject};
-use super::queue::{Held, Next, Outcomes, Queue};
+use super::queue::{Next, Outcomes, Queue};
 use super::replies::{GivenUp, Unusable};
 use super::rollout::{self, EpisodeStage, Nobody, Observer, Played};
 use super::shares::Shares;
@@ -38,14 +37,12 @@ pub trait Progress: Sync {
     fn episode(&self, key: &Key, id: &str, steps: usize);
     fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
     fn lost(&self, id: &str, reason: &str);
-    /// Only episodes held by other processes remain; this is one of them. Called repeatedly.
-    fn waiting(&self, id: &str, held: &Held);
 }
 
 /// The seed of practice episodes; those of recordings are smaller.
 const PRACTICE_SEED: i32 = 9_000;
 
-/// The interval of checks for episodes held by other processes.
+/// The interval of checks for episodes whose players are busy.
 const AGAIN: Duration = Duration::from_millis(50);
 
 #[derive(Clone, Copy, Debug)]
@@ -73,8 +70,6 @@ pub struct Tally {
     pub by_limit: bool,
     /// The number of episodes not played because their participants have left.
     pub left_out: usize,
-    /// Episodes that other processes recorded in the meantime.
-    pub elsewhere: Vec<Key>,
     /// True if the recording was stopped before its end.
     pub stopped: bool,
     /// The reason for the stop, if the agent could not answer.
@@ -114,7 +109,7 @@ fn open_file_limit() -> Option<u64> {
 
 impl Recording<'_> {
     pub fn run(&self, keys: &[Key]) -> Result<Tally, RecordError> {
-        let queue = Queue::new(self.store, keys);
+        let queue = Queue::new(keys);
         let unusable = Unusable::new(self.settings.max_unusable);
         let in_flight = self.settings.in_flight.get();
         let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
@@ -126,9 +121,9 @@ impl Recording<'_> {
                 (0..threads).map(|at| scope.spawn(move || self.thread(queue, unusable, share(at)))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
-        let (elsewhere, left_out, stopped) = queue.into_rest();
+        let (left_out, stopped) = queue.into_rest();
         let given_up = unusable.given_up();
-        let mut tally = Tally { left_out, elsewhere, stopped, given_up, ..Tally::default() };
+        let mut tally = Tally { left_out, stopped, given_up, ..Tally::default() };
         for result in results {
             let part = result?;
             tally.recorded.extend(part.recorded);
@@ -144,7 +139,7 @@ impl Recording<'_> {
         Ok(tally)
     }
 
-    fn thread(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
+    fn thread(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let start = Instant::now();
         let result = self.episodes(queue, unusable, each);
         self.shares.all.add(start);
@@ -154,7 +149,7 @@ impl Recording<'_> {
         result
     }
 
-    fn episodes(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
+    fn episodes(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let is_needed = self.settings.frames || self.player.looks();
         let start = Instant::now();
         let eyes =
@@ -163,21 +158,24 @@ impl Recording<'_> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
-            let play = |key: Key, lock| {
+            let play = |key: Key| {
                 let eye = eyes.as_ref().map(|eyes| eyes.eye(self.config, &key.experiment));
                 async move {
-                    let result = self.episode(&key, lock, eye, unusable).await;
+                    let result = self.episode(&key, eye, unusable).await;
                     (key, result)
                 }
             };
             let mut under_way = FuturesUnordered::new();
             loop {
-                let next = self.take_up(queue, each, &mut under_way, play)?;
+                let next = self.take_up(queue, each, &mut under_way, play);
                 let is_last = matches!(next, Next::Nothing);
                 self.assemble(queue);
                 let ended = match next {
                     Next::Nothing => under_way.next().await,
-                    _ if under_way.is_empty() => self.wait(&next).await,
+                    _ if under_way.is_empty() => {
+                        tokio::time::sleep(AGAIN).await;
+                        None
+                    }
                     _ => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
                 };
                 match ended {
@@ -192,10 +190,10 @@ impl Recording<'_> {
     }
 
     /// Assembles the newly complete experiments, so that they can be viewed while others are played.
-    fn assemble(&self, queue: &Queue<'_>) {
+    fn assemble(&self, queue: &Queue) {
         for (experiment, Outcomes { recorded, lost, .. }) in queue.complete() {
             // Failures here are retried and reported at the end of the recording; no episode need be lost.
-            let _ = self.store.note_lost(&recorded, lost);
+            let _ = self.store.note_lost(&recorded, &lost);
             let _ = self.store.assemble(&experiment);
         }
     }
@@ -203,33 +201,24 @@ impl Recording<'_> {
     /// Takes episodes up to the limit under way; returns why it took no more.
     fn take_up<F>(
         &self,
-        queue: &Queue<'_>,
+        queue: &Queue,
         each: usize,
         under_way: &mut FuturesUnordered<F>,
-        play: impl Fn(Key, EpisodeLock) -> F,
-    ) -> Result<Next, RecordError> {
+        play: impl Fn(Key) -> F,
+    ) -> Next {
         let turn = |key: &Key| self.player.turn(&key.episode_id(self.subject));
         while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
-            match queue.next(turn).map_err(RecordError::fatal)? {
-                Next::Play(key, lock) => under_way.push(play(key, lock)),
-                rest => return Ok(rest),
+            match queue.next(turn) {
+                Next::Play(key) => under_way.push(play(key)),
+                rest => return rest,
             }
         }
-        Ok(Next::Nothing)
-    }
-
-    async fn wait<T>(&self, next: &Next) -> Option<T> {
-        if let Next::Held(held) = next {
-            self.progress.waiting(&held.key.episode_id(self.subject), held);
-        }
-        tokio::time::sleep(AGAIN).await;
-        None
+        Next::Nothing
     }
 
     async fn episode(
         &self,
         key: &Key,
-        _lock: EpisodeLock,
         eye: Option<&RefCell<Camera>>,
         unusable: &Unusable,
     ) -> Result<usize, RecordError> {
@@ -299,7 +288,7 @@ impl Recording<'_> {
 
     fn note(
         &self,
-        queue: &Queue<'_>,
+        queue: &Queue,
         key: Key,
         result: Result<usize, RecordError>,
         tally: &mut Tally,

@@ -29,7 +29,9 @@ use exact::suggest::hint;
 use world::agent::Player;
 use world::agent::scripted::{Renamed, Scripted};
 use world::agent::vlm::probe::ProbeAnswer;
+use world::record::failures::LostEpisode;
 use world::record::index::RecordingIndex;
+use world::record::lock::FolderLock;
 use world::record::metadata::Recordings;
 use world::record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
 use world::record::run::{Recording, Settings, Tally};
@@ -46,7 +48,7 @@ const MOST_EPISODES: Limit =
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
-/// Run the same command again to continue a recording. Several processes divide the episodes among themselves. Ctrl-C
+/// Run the same command again to continue a recording. One process at a time records into a folder. Ctrl-C
 /// stops after the current steps, a second Ctrl-C at once; complete episodes stay. Exits with 1 if episodes were lost
 /// because no answer came, with 2 if the agent could not continue, and with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
@@ -73,7 +75,7 @@ pub struct RecordArgs {
     /// Record each scene this many times: the variation between repeats is the noise that a difference must exceed
     #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(i32).range(1..=99))]
     repeats: i32,
-    /// Record one share of the episodes, such as 3/16; shares may go into one folder
+    /// Record one share of the episodes, such as 3/16; each process needs an --out of its own
     #[arg(long, value_name = "I/N", default_value = "1/1")]
     shard: Shard,
     /// The folder for traces and logs
@@ -179,9 +181,10 @@ impl RecordArgs {
     }
 
     fn record_one(&self, playing: &Playing, stop: &AtomicBool) -> Result<Recorded, Failure> {
+        let lock = self.lock()?;
         let player = self.player()?;
         *playing.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&player));
-        let recorded = self.record(player.as_ref(), stop)?;
+        let recorded = self.record(lock, player.as_ref(), stop)?;
         recording::say(&recorded, &self.out, &self.files())?;
         Ok(recorded)
     }
@@ -240,7 +243,7 @@ impl RecordArgs {
             return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
         }
         match self.agent.as_str() {
-            "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
+            "vlm" => Ok(Arc::new(self.vlm.player(&self.out, self.in_flight)?)),
             #[cfg(feature = "view")]
             HUMAN => {
                 let each = (self.seeds, self.repeats);
@@ -302,13 +305,18 @@ impl RecordArgs {
         Ok(ForecastAnswer::of(&subject, episodes.planned.len(), &episodes.todo, config, requests))
     }
 
+    /// Locks the folder for this process, before a player reads or writes there.
+    pub fn lock(&self) -> Result<FolderLock, Failure> {
+        FolderLock::take(&self.out).map_err(Failure::input)
+    }
+
     /// Records with this player, whatever `--agent` names, until the end or until `stop` is set. Reports only progress.
-    pub fn record(&self, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
+    pub fn record(&self, lock: FolderLock, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
         let subject = &self.subject(player);
         let recording = self.recordings(config, plan, player)?;
-        let store = &Store::open(&self.out, subject.clone(), recording).map_err(Failure::input)?;
+        let store = &Store::new(lock, subject.clone(), recording);
         let episodes = Episodes::of(plan, |experiment| store.recorded(experiment))?;
         let Episodes { planned, todo } = &episodes;
         if todo.len() < planned.len() {
@@ -334,17 +342,15 @@ impl RecordArgs {
         let deleted = deleted.map_err(Failure::input)?;
         let stays = |key: &Key| !deleted.contains(&key.episode_id(subject));
         let found: Vec<Key> = episodes.found().into_iter().filter(stays).collect();
-        let Tally { recorded, elsewhere, lost, under_way, by_limit, left_out, steps, stopped, given_up } = tally;
+        let Tally { recorded, lost, under_way, by_limit, left_out, steps, stopped, given_up } = tally;
         let recorded: Vec<Key> = recorded.into_iter().filter(stays).collect();
-        let all = [found.as_slice(), &recorded, &elsewhere].concat();
-        let lost_here = lost.len();
-        let lost = store.note_lost(&all, lost).map_err(Failure::input)?;
+        let lost: Vec<LostEpisode> = lost.into_iter().map(|(_, lost)| lost).collect();
+        store.note_lost(&[found.as_slice(), &recorded].concat(), &lost).map_err(Failure::input)?;
         let answer = RecordAnswer {
             model: player.model().to_owned(),
             asked: planned.len(),
             found: found.len(),
             recorded: recorded.len(),
-            elsewhere: elsewhere.len() + lost_here - lost.len(),
             left_out: left_out + planned.iter().filter(|key| !stays(key)).count(),
             steps,
             replies: bar.replies(),

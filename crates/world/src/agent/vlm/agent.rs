@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use super::journal::{Journal, JournalError, Recorded};
 use super::limits::Begun;
 use super::model::{Memory, Vlm};
-use super::step::{Asked, Step};
+use super::step::Step;
 use super::wire_format::ModelAnswer;
 use crate::agent::prompt::Prompt;
 use crate::agent::reply;
@@ -22,8 +22,7 @@ impl Vlm {
             Memory::Journals(_) => Journal::open(&path)?,
             Memory::Cassette(_) => Journal::cassette(&path)?,
         };
-        let (vlm, episode) = (Arc::clone(self), episode.to_owned());
-        Ok(VlmAgent { vlm, task, episode, journal: Arc::new(Mutex::new(journal)), begun: None })
+        Ok(VlmAgent { vlm: Arc::clone(self), task, journal: Arc::new(Mutex::new(journal)), begun: None })
     }
 }
 
@@ -31,7 +30,6 @@ impl Vlm {
 pub struct VlmAgent {
     vlm: Arc<Vlm>,
     task: Task,
-    episode: String,
     journal: Arc<Mutex<Journal>>,
     begun: Option<Begun>,
 }
@@ -70,7 +68,6 @@ impl VlmAgent {
             vlm: Arc::clone(&self.vlm),
             journal: Arc::clone(&self.journal),
             t: observation.t,
-            id: hash::of_bytes(format!("{} {} {question} {frame}", self.episode, observation.t).as_bytes()),
             frame,
             body: self.vlm.choice.body(&words, &schema, &STANDARD.encode(png)),
             question,
@@ -79,10 +76,8 @@ impl VlmAgent {
         let network = network.clone();
         self.take_turn(observation, at_most).await?;
         let asked = network.spawn(step.ask()).await;
-        match asked.map_err(|fault| Lost::because(format!("a request broke off: {fault}")))?? {
-            Asked::GivenUp(status) => Ok(Reply::without_decision(status, None)),
-            Asked::Answer { answer, latency_ms } => Ok(self.reply_of(answer, latency_ms)),
-        }
+        let asked = asked.map_err(|fault| Lost::because(format!("a request broke off: {fault}")))??;
+        Ok(self.reply_of(asked.answer, asked.latency_ms))
     }
 
     async fn take_turn(&mut self, observation: &Observation, at_most: [u64; 2]) -> Result<(), Lost> {
@@ -102,24 +97,17 @@ impl VlmAgent {
 
     /// The reply from a recorded answer, which must belong to this question.
     fn reply_to(&self, t: i32, question: &str, recorded: &Recorded) -> Result<Reply, Lost> {
-        if recorded.question() != question {
+        if recorded.question != question {
             let reason = format!(
                 "the recorded answer of step {t} belongs to another request: the prompt, the model's settings or the world changed\n  help: record into another folder, or remove the episode's journal"
             );
             return Err(Lost::because(reason));
         }
-        match recorded {
-            Recorded::GivenUp { status, .. } => Ok(Reply::without_decision(*status, None)),
-            Recorded::Answer { body, latency_ms, .. } => {
-                self.vlm.note_answered();
-                let answer = self
-                    .vlm
-                    .read(body)
-                    .ok_or_else(|| Lost::because(format!("the recorded answer of step {t} cannot be read")))?;
-                self.vlm.check_model(answer.model.as_deref())?;
-                Ok(self.reply_of(answer, *latency_ms))
-            }
-        }
+        self.vlm.note_answered();
+        let unreadable = || Lost::because(format!("the recorded answer of step {t} cannot be read"));
+        let answer = self.vlm.read(&recorded.body).ok_or_else(unreadable)?;
+        self.vlm.check_model(answer.model.as_deref())?;
+        Ok(self.reply_of(answer, recorded.latency_ms))
     }
 
     fn reply_of(&self, answer: ModelAnswer, latency_ms: i32) -> Reply {

@@ -2,10 +2,9 @@
 
 use std::path::Path;
 
-use super::journal::{Journal, JournalError, Recorded};
+use super::journal::{Journal, JournalError};
 use super::limits::Spend;
 use super::model::{Memory, Vlm, tokens};
-use exact::replace::folder_of;
 
 /// The average answer of finished episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,28 +31,10 @@ impl Vlm {
         }
     }
 
-    /// Adds the spending of earlier starts on the model, from its journals, for a start that spends nothing. `slug` is
-    /// the model's name in episode names.
+    /// Adds the spending of earlier starts on the model, from its journals. `slug` is the model's name in episode names.
     pub fn count_spent(&self, slug: &str) -> Result<(), JournalError> {
         let Memory::Journals(folder) = &self.memory else { return Ok(()) };
         self.account.begin_with(spent(self, folder, slug)?);
-        Ok(())
-    }
-
-    /// Shares the account with other processes that record the model into the same folder, by the ledger at this path.
-    /// `slug` is the model's name in episode names.
-    pub fn share_account(&self, ledger: &Path, slug: &str) -> Result<(), Box<dyn std::error::Error>> {
-        let (Memory::Journals(folder), Some(provider)) = (&self.memory, &self.provider) else { return Ok(()) };
-        provider.share(folder_of(ledger), &self.choice.backend.key)?;
-        let mut is_read = false;
-        self.account.share(ledger, provider.patience().timeout, || {
-            is_read = true;
-            spent(self, folder, slug).map_err(Box::<dyn std::error::Error>::from)
-        })?;
-        // The ledger includes their costs; the typical cost of an answer still comes from the journals.
-        if !is_read {
-            spent(self, folder, slug)?;
-        }
         Ok(())
     }
 
@@ -69,9 +50,8 @@ impl Vlm {
             count += 1;
             steps.push(f64::from(u32::try_from(journal.answers().count()).unwrap_or(u32::MAX)));
             for recorded in journal.answers() {
-                let Recorded::Answer { body, latency_ms, .. } = recorded else { continue };
-                seconds.push(f64::from(*latency_ms) / 1e3);
-                let Some(answer) = self.read(body) else { continue };
+                seconds.push(f64::from(recorded.latency_ms) / 1e3);
+                let Some(answer) = self.read(&recorded.body) else { continue };
                 costs.extend(self.choice.cost_usd(&answer));
                 tokens.extend(answer.completion_tokens.map(f64::from));
             }
@@ -121,13 +101,12 @@ fn add_journal(vlm: &Vlm, journal: &Journal, spend: &mut Spend) {
         spend.add_unanswered(usd(at_most));
     }
     for recorded in journal.answers() {
-        let Recorded::Answer { body, at_most, .. } = recorded else { continue };
-        let answer = vlm.read(body);
+        let answer = vlm.read(&recorded.body);
         if let Some(answer) = &answer {
             vlm.learn_from(answer);
         }
         let cost = answer.as_ref().and_then(|answer| vlm.choice.cost_usd(answer));
-        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(*at_most));
+        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(recorded.at_most));
     }
 }
 

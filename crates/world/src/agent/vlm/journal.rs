@@ -5,18 +5,17 @@
 //! request that was answered. A kept journal is a cassette: it replays the episode without a network.
 //!
 //! A last line that was cut off, or that a power loss left as zeros, is dropped when the file is opened again: it had
-//! no effect yet. Only one process at a time writes a journal.
+//! no effect yet. Only one process at a time writes a journal: the owner of the recording's folder.
 //!
 //! Journals hold no keys: [`Secrets`](super::secrets) are removed from answers before they are written.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::agent::Status;
 use crate::json_lines;
 use exact::budget::Limit;
 use exact::input;
@@ -58,7 +57,6 @@ pub enum Entry {
         attempt: u32,
         status: String,
         detail: String,
-        is_final: bool,
         /// The provider may have made an answer, and may bill it.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         may_be_paid: bool,
@@ -66,27 +64,13 @@ pub enum Entry {
     },
 }
 
+/// The answer to a step.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Recorded {
-    Answer {
-        question: String,
-        latency_ms: i32,
-        body: String,
-        at_most: Option<[u64; 2]>,
-    },
-    /// The step ended without an answer, with this status.
-    GivenUp {
-        question: String,
-        status: Status,
-    },
-}
-
-impl Recorded {
-    pub fn question(&self) -> &str {
-        match self {
-            Self::Answer { question, .. } | Self::GivenUp { question, .. } => question,
-        }
-    }
+pub struct Recorded {
+    pub question: String,
+    pub latency_ms: i32,
+    pub body: String,
+    pub at_most: Option<[u64; 2]>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -128,19 +112,8 @@ pub enum JournalError {
     Io { path: PathBuf, source: io::Error },
     #[error("line {line} of the journal `{}` is damaged: {fault}\n  help: remove the file to ask the model again", path.display())]
     Damaged { path: PathBuf, line: usize, fault: serde_json::Error },
-    #[error("the journal `{}` is being written by another process\n  help: wait until it ends, or record into another folder", path.display())]
-    Busy { path: PathBuf },
     #[error("the cassette has no `{}`\n  help: record the episode with its model first, or choose fewer episodes", path.display())]
     Missing { path: PathBuf },
-}
-
-impl Drop for Journal {
-    fn drop(&mut self) {
-        // A process being started may briefly hold a copy of the file, and its lock.
-        if let Some(file) = &self.file {
-            let _ = file.unlock();
-        }
-    }
 }
 
 impl Journal {
@@ -148,10 +121,6 @@ impl Journal {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
         make_folder(folder_of(path)).map_err(failed)?;
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-        // If the file system has no locks, only the episode's lock protects the journal.
-        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-            return Err(JournalError::Busy { path: path.to_owned() });
-        }
         let (mut journal, whole) = Self::read(path)?;
         if whole < file.metadata().map_err(failed)?.len() {
             file.set_len(whole).map_err(failed)?;
@@ -238,11 +207,7 @@ impl Journal {
                 let at_most = requests.at_most;
                 requests.note_outcome(false);
                 let (question, body) = (question.clone(), body.clone());
-                recorded.insert(*t, Recorded::Answer { question, latency_ms: *latency_ms, body, at_most });
-            }
-            Entry::Failure { t, status, is_final: true, question, .. } => {
-                let status = Status::named(status).unwrap_or(Status::ServerError);
-                recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
+                recorded.insert(*t, Recorded { question, latency_ms: *latency_ms, body, at_most });
             }
             Entry::Failure { may_be_paid, .. } => requests.note_outcome(*may_be_paid),
         }
@@ -254,7 +219,7 @@ mod tests {
     use std::fs;
     use std::path::{Path, PathBuf};
 
-    use super::{Entry, Journal, JournalError, Recorded};
+    use super::{Entry, Journal, JournalError};
 
     fn answer(t: i32) -> Entry {
         let (question, body) = (format!("question {t}"), format!("answer {t}"));
@@ -262,11 +227,7 @@ mod tests {
     }
 
     fn answered(journal: &Journal) -> Vec<String> {
-        let body = |recorded: &Recorded| match recorded {
-            Recorded::Answer { body, .. } => body.clone(),
-            Recorded::GivenUp { .. } => "none".to_owned(),
-        };
-        journal.answers().map(body).collect()
+        journal.answers().map(|recorded| recorded.body.clone()).collect()
     }
 
     fn with_lines(folder: &Path, count: i32) -> PathBuf {
@@ -304,7 +265,7 @@ mod tests {
         };
         let failure = |may_be_paid| {
             let (status, detail, question) = ("timeout".to_owned(), String::new(), String::new());
-            Entry::Failure { t: 1, attempt: 1, status, detail, is_final: false, may_be_paid, question }
+            Entry::Failure { t: 1, attempt: 1, status, detail, may_be_paid, question }
         };
         let entries = [
             [request(1), failure(false)],
@@ -333,16 +294,5 @@ mod tests {
             assert!(matches!(error, JournalError::Damaged { line: found, .. } if found == line), "{error}");
             assert_eq!(fs::read_to_string(&path).unwrap(), damaged);
         }
-    }
-
-    #[test]
-    fn one_writes_at_a_time_and_others_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = with_lines(folder.path(), 1);
-        let first = Journal::open(&path).unwrap();
-        assert!(matches!(Journal::open(&path).unwrap_err(), JournalError::Busy { .. }));
-        assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1"]);
-        drop(first);
-        assert_eq!(answered(&Journal::open(&path).unwrap()), ["answer 1"]);
     }
 }

@@ -12,10 +12,10 @@
 //! | [`models`] | the models, their providers and prices |
 //! | [`wire_format`] | the format of requests and answers |
 //! | `request` | the body of a model's request, and the cost of its answer |
-//! | [`provider`] | sending single requests and batches: concurrency, failures, waits requested by providers |
+//! | [`provider`] | sending requests: concurrency, failures, waits requested by providers |
 //! | [`probe`] | the parameters that a model takes |
 //! | `step` | the reaction to failures: another attempt, a lost episode, the end |
-//! | `spending` | a run's spending limits, over several processes; estimates |
+//! | `spending` | a run's spending limits; estimates |
 //! | [`journal`], `answered` | requests and answers on disk; statistics of a model from them |
 //! | [`secrets`] | keys, and texts without them |
 //!
@@ -37,7 +37,6 @@ pub mod wire_format;
 
 pub use agent::VlmAgent;
 pub use answered::Typical;
-pub use model::{Memory, OnOutage, Vlm};
+pub use model::{Memory, Vlm};
 pub use provider::{Unreachable, concurrency, failure};
-pub use request::Tier;
 pub use spending::{estimate, limits};

@@ -17,16 +17,6 @@ use super::wire_format::ModelAnswer;
 use crate::agent::reply::Ending;
 use crate::agent::{Lost, locked};
 
-/// The behaviour after the last attempt for a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum OnOutage {
-    /// The episode is lost: it is counted separately, left out of the trace, and recorded when the command runs again.
-    #[default]
-    Lose,
-    /// The step counts without a decision, with the failure as its status, and the episode continues.
-    StandStill,
-}
-
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Memory {
     /// A folder of journals to continue.
@@ -77,7 +67,6 @@ pub struct Vlm {
     pub(super) network: Option<Handle>,
     pub(super) memory: Memory,
     pub(super) account: Arc<Account>,
-    pub(super) on_outage: OnOutage,
     stop: OnceLock<Lost>,
     stopped: Notify,
     pub(super) is_known: AtomicBool,
@@ -95,10 +84,9 @@ impl Vlm {
         network: Handle,
         journals: PathBuf,
         account: Arc<Account>,
-        on_outage: OnOutage,
     ) -> Self {
         let (provider, network) = (Some(provider), Some(network));
-        Self { provider, network, account, on_outage, ..Self::of(choice, Memory::Journals(journals)) }
+        Self { provider, network, account, ..Self::of(choice, Memory::Journals(journals)) }
     }
 
     /// A model whose answers are replayed from journals; it needs no key and sends nothing.
@@ -113,7 +101,6 @@ impl Vlm {
             network: None,
             memory,
             account: Arc::default(),
-            on_outage: OnOutage::default(),
             stop: OnceLock::new(),
             stopped: Notify::new(),
             is_known: AtomicBool::new(false),

@@ -127,7 +127,7 @@ pub async fn probe(mut choice: Choice, provider: &Provider, experiment: &Spec, v
     loop {
         probed.requests += 1;
         let turn = provider.turn().await;
-        let failure = match provider.ask(turn, "probe", &choice.body(&words, &schema, &png)).await {
+        let failure = match provider.ask(turn, &choice.body(&words, &schema, &png)).await {
             Ok(received) => {
                 probed.note_answer(received, &choice, experiment);
                 return probed;

@@ -1,34 +1,22 @@
 use serde_json::Value;
 
 use super::models::{Choice, Contract, Prices, merge};
-use super::wire_format::{Dialect, ModelAnswer, Question};
+use super::wire_format::{ModelAnswer, Question};
 use crate::agent::prompt;
 
-/// A service tier at half the price.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tier {
-    /// Answers take minutes.
-    Flex,
-    /// Requests are sent in batches, whose answers take up to hours.
-    Batch,
-}
-
 #[derive(Debug, thiserror::Error)]
-#[error(
-    "the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex and batch, \
-     Anthropic (anthropic-messages) has --tier batch"
-)]
+#[error("the backend `{backend}` has no such tier\n  help: OpenAI (openai-chat) and Google (gemini) have --tier flex")]
 pub struct NoTier {
     backend: String,
 }
 
 impl Choice {
-    pub fn use_tier(&mut self, tier: Tier) -> Result<(), NoTier> {
-        match (tier, self.backend.dialect.tier_key(), self.backend.dialect) {
-            (Tier::Flex, Some(key), _) => drop(self.model.extra_body.insert(key.to_owned(), "flex".into())),
-            (Tier::Batch, _, Dialect::OpenaiChat | Dialect::Gemini | Dialect::AnthropicMessages) => {}
-            _ => return Err(NoTier { backend: self.model.backend.clone() }),
-        }
+    /// Asks for the flex tier: half the price, and answers that take minutes.
+    pub fn use_flex_tier(&mut self) -> Result<(), NoTier> {
+        let Some(key) = self.backend.dialect.tier_key() else {
+            return Err(NoTier { backend: self.model.backend.clone() });
+        };
+        self.model.extra_body.insert(key.to_owned(), "flex".into());
         let Prices { input, cached_input, output } = self.model.prices;
         let [input, cached_input, output] = [input, cached_input, output].map(|price| price.map(|price| price / 2.0));
         self.model.prices = Prices { input, cached_input, output };

@@ -7,27 +7,25 @@ use serde_json::Value;
 
 use super::journal::{Entry, Journal};
 use super::limits::Reached;
-use super::model::{OnOutage, Vlm, tokens};
+use super::model::{Vlm, tokens};
 use super::provider::failure::{Failure, FailureKind};
 use super::provider::{Provider, Received, Waiting};
 use super::wire_format::ModelAnswer;
-use crate::agent::{Lost, Status, locked, milliseconds};
+use crate::agent::{Lost, locked, milliseconds};
 
 pub(super) struct Step {
     pub(super) vlm: Arc<Vlm>,
     pub(super) journal: Arc<Mutex<Journal>>,
     pub(super) t: i32,
-    /// The request's unique name within a recording: 64 hexadecimal digits.
-    pub(super) id: String,
     pub(super) frame: String,
     pub(super) body: Value,
     pub(super) question: String,
     pub(super) at_most: [u64; 2],
 }
 
-pub(super) enum Asked {
-    Answer { answer: ModelAnswer, latency_ms: i32 },
-    GivenUp(Status),
+pub(super) struct Asked {
+    pub(super) answer: ModelAnswer,
+    pub(super) latency_ms: i32,
 }
 
 /// A request's answer or its failure; the error ends the episode.
@@ -53,7 +51,7 @@ impl Step {
             match waiting.next(&failure) {
                 Some(wait) => self.vlm.unless_stopped(tokio::time::sleep(wait)).await?,
                 None if is_too_long(&failure) => return Err(self.put_off(&failure)),
-                None => return self.give_up(attempt, &failure),
+                None => return Err(self.lost(attempt, &failure)),
             }
         }
     }
@@ -93,7 +91,7 @@ impl Step {
             reserved.refused();
             return Err(lost);
         }
-        match provider.ask(turn, &self.id, &self.body).await {
+        match provider.ask(turn, &self.body).await {
             Ok(received) => {
                 let Received { answer, body, latency, .. } = received;
                 self.vlm.learn_from(&answer);
@@ -104,7 +102,7 @@ impl Step {
                 self.vlm.note_answered();
                 self.vlm.check_model(answer.model.as_deref())?;
                 self.vlm.check_cost(&answer)?;
-                Ok(Ok(Asked::Answer { answer, latency_ms }))
+                Ok(Ok(Asked { answer, latency_ms }))
             }
             Err(failure) => {
                 if !failure.may_be_paid {
@@ -112,29 +110,17 @@ impl Step {
                 }
                 let status = failure.kind.status().name().to_owned();
                 let (detail, may_be_paid) = (failure.detail.clone(), failure.may_be_paid);
-                self.write(&Entry::Failure { t, attempt, status, detail, is_final: false, may_be_paid, question })?;
+                self.write(&Entry::Failure { t, attempt, status, detail, may_be_paid, question })?;
                 Ok(Err(failure))
             }
         }
     }
 
-    fn give_up(&self, attempt: u32, failure: &Failure) -> Result<Asked, Lost> {
+    /// An episode without an answer to a step is lost: in no trace, and recorded when the command runs again.
+    fn lost(&self, attempt: u32, failure: &Failure) -> Lost {
         let status = failure.kind.status();
-        if self.vlm.on_outage == OnOutage::Lose {
-            let name = status.name();
-            let cause = format!("step {}: {name} after {attempt} attempts: {}", self.t, failure.detail);
-            return Err(Lost::counted_as(status, cause));
-        }
-        let entry = Entry::Failure {
-            t: self.t,
-            attempt,
-            status: status.name().to_owned(),
-            detail: failure.detail.clone(),
-            is_final: true,
-            may_be_paid: false,
-            question: self.question.clone(),
-        };
-        self.write(&entry).map(|()| Asked::GivenUp(status))
+        let (t, name, detail) = (self.t, status.name(), &failure.detail);
+        Lost::counted_as(status, format!("step {t}: {name} after {attempt} attempts: {detail}"))
     }
 
     /// A failed write of the journal ends the run: continuing would repeat requests, and pay twice.

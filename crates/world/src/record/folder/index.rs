@@ -1,19 +1,17 @@
 //! Reads the content of a recording's folder, and never writes.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File};
+use std::collections::BTreeSet;
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
 
 use serde_json::Value;
 
 use super::super::continued;
 use super::super::error::StoreError;
-use super::super::lock::{entries_of, is_at, parts_of};
+use super::super::lock::{entries_of, parts_of};
 use super::super::metadata::{Recordings, difference};
 use super::super::plan::Subject;
-use crate::agent::locked;
 use crate::sim::Experiment;
 use trace::error::TraceError;
 use trace::inputs::Input;
@@ -27,25 +25,14 @@ pub struct RecordingIndex {
     folder: PathBuf,
     subject: Subject,
     recordings: Recordings,
-    traces: Mutex<BTreeMap<Experiment, InTrace>>,
 }
 
 /// The seed, run and repetition of an episode.
 pub type Place = (i32, i32, i32);
 
-type Places = Arc<BTreeSet<Place>>;
-
-/// The content of a trace, valid as long as this file has its path. The file stays open, so that no other file gets its
-/// identity.
-#[derive(Debug)]
-struct InTrace {
-    file: File,
-    places: Places,
-}
-
 impl RecordingIndex {
     pub fn new(folder: &Path, subject: Subject, recordings: Recordings) -> Self {
-        Self { folder: folder.to_owned(), subject, recordings, traces: Mutex::default() }
+        Self { folder: folder.to_owned(), subject, recordings }
     }
 
     pub(in crate::record) const fn subject(&self) -> &Subject {
@@ -67,7 +54,7 @@ impl RecordingIndex {
     pub fn recorded(&self, experiment: &Experiment) -> Result<BTreeSet<Place>, StoreError> {
         let episodes = self.episodes(experiment)?;
         self.check_log(experiment, &episodes)?;
-        Ok(places(&episodes))
+        Ok(episodes.iter().map(place).collect())
     }
 
     pub(in crate::record) fn episodes(&self, experiment: &Experiment) -> Result<Vec<EpisodeRows>, StoreError> {
@@ -83,23 +70,6 @@ impl RecordingIndex {
         episodes.sort_by_key(|episode| (episode.seed, episode.run, episode.repetition));
         episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
         Ok(episodes)
-    }
-
-    /// The episodes in the trace of an experiment, read again only if the trace was replaced.
-    pub(in crate::record) fn in_trace(&self, experiment: &Experiment) -> Result<Places, StoreError> {
-        let path = self.trace(experiment);
-        let mut traces = locked(&self.traces);
-        if let Some(known) = traces.get(experiment).filter(|known| is_at(&known.file, &path)) {
-            return Ok(Arc::clone(&known.places));
-        }
-        let file = match File::open(&path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Places::default()),
-            file => file.map_err(StoreError::io("open", &path))?,
-        };
-        self.check(experiment, &path)?;
-        let places = Arc::new(places(&merge::read(&path)?));
-        traces.insert(experiment.clone(), InTrace { file, places: Arc::clone(&places) });
-        Ok(places)
     }
 
     pub(in crate::record) fn check_log(
@@ -144,10 +114,6 @@ pub(in crate::record) fn recording_of(path: &Path) -> Result<Value, StoreError> 
         .map_err(|findings| TraceError::of(findings).map_or_else(unopened, StoreError::Trace))?;
     let text = file.metadata_value(RECORDING_KEY).unwrap_or("{}");
     Ok(serde_json::from_str(text).unwrap_or(Value::Null))
-}
-
-fn places(episodes: &[EpisodeRows]) -> BTreeSet<Place> {
-    episodes.iter().map(place).collect()
 }
 
 pub(in crate::record) fn place(episode: &EpisodeRows) -> Place {

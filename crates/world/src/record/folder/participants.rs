@@ -9,8 +9,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::index::recording_of;
-use super::super::lock::FolderLock;
+use super::super::lock::{FolderLock, WRITING, parts_of};
 use crate::agent::human::journal;
+use crate::agent::locked;
 use trace::labels;
 use trace::log::assemble;
 use trace::merge::{self, EpisodeRows};
@@ -30,23 +31,22 @@ pub struct Removed {
 
 pub(crate) type RemovalError = Box<dyn Error + Send + Sync>;
 
-/// Removes all data of the person with this code from a folder. No process may record into it meanwhile; writes in
-/// progress are awaited.
+/// Removes all data of the person with this code from a folder, into which nobody may record meanwhile.
 pub fn remove(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
+    if !folder.is_dir() {
+        return Err(format!("{}: expected the folder of a recording, found none", folder.display()).into());
+    }
+    let _lock = FolderLock::take(folder)?;
     let mut removed = remove_episodes(folder, code)?;
     removed.journal_lines = journal::remove(folder, code)?;
     Ok(removed)
 }
 
-/// Removes the episodes of a person from the traces, logs and labels of a folder.
+/// Removes the episodes of a person from the traces, logs and labels of a folder, for the process that has its lock.
 pub fn remove_episodes(folder: &Path, code: &str) -> Result<Removed, RemovalError> {
-    if !folder.is_dir() {
-        return Err(format!("{}: expected the folder of a recording, found none", folder.display()).into());
-    }
-    let stake = FolderLock::stake(folder)?;
-    let _lock = stake.lock()?;
+    let _writing = locked(&WRITING);
     let mut removed = Removed::default();
-    for trace in traces(folder).into_iter().chain(traces(&stake.parts())) {
+    for trace in traces(folder).into_iter().chain(traces(&parts_of(folder))) {
         remove_from(&trace, code, &mut removed)?;
     }
     Ok(removed)

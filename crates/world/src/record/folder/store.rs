@@ -7,15 +7,13 @@
 //! OUT/.parts/E1-oracle-s1-r3.*     episodes that are whole, and not in the trace yet
 //! ```
 //!
-//! Rule: only the process with an episode's lock plays it. It writes the episode under a temporary name, synchronises
-//! and renames it, the trace last, so that it exists completely or not at all. The trace is assembled from the parts
-//! and its previous content, by seed and run, and replaced in one step: when its experiment is complete, and at the end
-//! of the recording. Any number of processes may record the same or different episodes into one folder; the trace is
-//! the same as that of a single one.
+//! Rule: one process at a time records into a folder. It writes an episode under a temporary name, synchronises and
+//! renames it, the trace last, so that it exists completely or not at all. The trace is assembled from the parts and its
+//! previous content, by seed and run, and replaced in one step: when its experiment is complete, and at the end of the
+//! recording.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -24,9 +22,10 @@ use super::super::error::StoreError;
 use super::super::failures::{self, LostEpisode};
 use super::super::fingerprint::Fingerprint;
 use super::super::index::{Place, RecordingIndex, place, recording_of};
-use super::super::lock::{Attempt, EpisodeLock, FolderLock};
+use super::super::lock::{FolderLock, WRITING};
 use super::super::metadata::{FINGERPRINTS, Recordings, SEEDS};
 use super::super::plan::{Key, Subject};
+use crate::agent::locked;
 use crate::sim::Experiment;
 use trace::episode::Episode;
 use trace::log::{LogError, assemble};
@@ -40,20 +39,10 @@ pub struct Store {
     index: RecordingIndex,
 }
 
-/// The owner of an episode to record.
-#[derive(Debug)]
-pub enum Claim {
-    /// This process, as long as it keeps the lock.
-    Ours(EpisodeLock),
-    /// Another process, with this id if known.
-    Theirs(Option<u32>),
-    /// No process: the episode is already recorded.
-    Recorded,
-}
-
 impl Store {
-    pub fn open(folder: &Path, subject: Subject, recordings: Recordings) -> Result<Self, StoreError> {
-        Ok(Self { folder_lock: FolderLock::stake(folder)?, index: RecordingIndex::new(folder, subject, recordings) })
+    pub fn new(folder_lock: FolderLock, subject: Subject, recordings: Recordings) -> Self {
+        let index = RecordingIndex::new(folder_lock.folder(), subject, recordings);
+        Self { folder_lock, index }
     }
 
     fn parts(&self) -> PathBuf {
@@ -78,50 +67,14 @@ impl Store {
     }
 
     pub fn recorded(&self, experiment: &Experiment) -> Result<BTreeSet<Place>, StoreError> {
-        // While another process moves a part into the trace, the episode may be in neither.
-        let _lock = self.folder_lock.lock()?;
         self.index.recorded(experiment)
     }
 
-    /// Locks an episode, unless it is recorded or another process has it.
-    pub fn turn(&self, key: &Key) -> Result<Claim, StoreError> {
-        let lock = match EpisodeLock::attempt(&self.part(key).with_extension("lock"))? {
-            Attempt::Theirs(process) => return Ok(Claim::Theirs(process)),
-            Attempt::Ours(lock) => lock,
-        };
-        if self.is_recorded(key)? {
-            return Ok(Claim::Recorded);
-        }
-        // A process killed before it committed the episode may have left its log.
-        let log = self.log_part(key);
-        match fs::remove_file(&log) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(StoreError::io("remove", &log)(error)),
-            _ => Ok(Claim::Ours(lock)),
-        }
-    }
-
-    fn is_recorded(&self, key: &Key) -> Result<bool, StoreError> {
-        // The order matters: a part is removed only after its episode is in the trace.
-        Ok(self.part(key).exists()
-            || self.index.in_trace(&key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
-    }
-
-    /// Updates the list of lost episodes: removes the recorded ones and adds those lost now. Returns the lost ones that
-    /// no other process has recorded by now.
-    pub fn note_lost(&self, recorded: &[Key], lost: Vec<(Key, LostEpisode)>) -> Result<Vec<LostEpisode>, StoreError> {
-        let _lock = self.folder_lock.lock()?;
-        let id = |key: &Key| key.episode_id(self.index.subject());
-        let mut recorded: BTreeSet<String> = recorded.iter().map(id).collect();
-        let mut still = Vec::new();
-        for (key, lost) in lost {
-            if self.is_recorded(&key)? {
-                recorded.insert(id(&key));
-            } else {
-                still.push(lost);
-            }
-        }
-        failures::update(&self.lost_list(), &recorded, &still)?;
-        Ok(still)
+    /// Updates the list of lost episodes: removes the recorded ones and adds those lost now.
+    pub fn note_lost(&self, recorded: &[Key], lost: &[LostEpisode]) -> Result<(), StoreError> {
+        let _writing = locked(&WRITING);
+        let recorded = recorded.iter().map(|key| key.episode_id(self.index.subject())).collect();
+        failures::update(&self.lost_list(), &recorded, lost)
     }
 
     pub fn lost_list(&self) -> PathBuf {
@@ -148,7 +101,7 @@ impl Store {
 
     /// Assembles the trace and the log of an experiment from its parts; does nothing without parts.
     pub fn assemble(&self, experiment: &Experiment) -> Result<(), StoreError> {
-        let _lock = self.folder_lock.lock()?;
+        let _writing = locked(&WRITING);
         let parts = self.index.parts_of(experiment)?;
         if parts.is_empty() {
             return Ok(());

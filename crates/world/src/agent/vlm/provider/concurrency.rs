@@ -1,26 +1,19 @@
 //! The number of concurrent requests: one more after a round of good answers, half after a reply that says that there
 //! were too many. No request is sent before a rate limit is renewed, or above the user's limit per minute.
-//!
-//! The time of the next request is shared by all processes that record into a folder with the same account.
 
-use std::io;
-use std::path::Path;
-use std::sync::{Mutex, OnceLock};
-use std::time::Duration;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
 use tokio::sync::Semaphore;
-use tokio::time::sleep;
+use tokio::time::sleep_until;
 
 use crate::agent::locked;
-use crate::agent::vlm::spending::shared_file::{SharedFile, now};
 
 #[derive(Debug)]
 pub(crate) struct Pace {
     permits: Semaphore,
     state: Mutex<State>,
     interval: Duration,
-    shared: OnceLock<SharedFile>,
 }
 
 #[derive(Debug)]
@@ -31,14 +24,10 @@ struct State {
     debt: usize,
     /// Good answers since the limit last changed.
     good: usize,
-    gate: Gate,
-}
-
-/// The time from which an account takes requests, since 1970.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-struct Gate {
-    not_before: Duration,
-    next: Duration,
+    /// The time from which the account takes requests.
+    not_before: Instant,
+    /// The time of the next request.
+    next: Instant,
 }
 
 /// Permission for one request, which counts as in flight until this is dropped.
@@ -51,15 +40,8 @@ impl Pace {
     /// At most `most` concurrent requests, and at least one; one per `interval`.
     pub fn new(most: usize, interval: Duration) -> Self {
         let most = most.clamp(1, Semaphore::MAX_PERMITS);
-        let state = State { limit: most, most, debt: 0, good: 0, gate: Gate::default() };
-        Self { permits: Semaphore::new(most), state: Mutex::new(state), interval, shared: OnceLock::new() }
-    }
-
-    pub fn share(&self, path: &Path) -> io::Result<()> {
-        let file = SharedFile::open(path)?;
-        // A second call has no effect.
-        let _ = self.shared.set(file);
-        Ok(())
+        let state = State { limit: most, most, debt: 0, good: 0, not_before: Instant::now(), next: Instant::now() };
+        Self { permits: Semaphore::new(most), state: Mutex::new(state), interval }
     }
 
     pub async fn turn(&self) -> Permit<'_> {
@@ -68,40 +50,26 @@ impl Pace {
             permit.forget();
         }
         let turn = Permit { pace: self };
-        let mut at = Duration::ZERO;
-        if !self.interval.is_zero() {
-            at = self.gate(|gate| {
-                let due = gate.next.max(gate.not_before).max(now());
-                gate.next = due + self.interval;
-                due
-            });
-        }
-        // A rate limit may be used up during the wait.
-        while let Some(wait) =
-            at.max(self.gate(|gate| gate.not_before)).checked_sub(now()).filter(|wait| !wait.is_zero())
-        {
-            sleep(wait).await;
+        let mut at = self.due();
+        while at > Instant::now() {
+            sleep_until(at.into()).await;
+            // A rate limit may be used up during the wait.
+            at = locked(&self.state).not_before;
         }
         turn
     }
 
-    pub fn pause(&self, wait: Duration) {
-        self.gate(|gate| gate.not_before = gate.not_before.max(now().saturating_add(wait)));
+    /// Takes the time of the next request.
+    fn due(&self) -> Instant {
+        let mut state = locked(&self.state);
+        let due = state.next.max(state.not_before).max(Instant::now());
+        state.next = due + self.interval;
+        due
     }
 
-    fn gate<T>(&self, change: impl FnOnce(&mut Gate) -> T) -> T {
+    pub fn pause(&self, wait: Duration) {
         let mut state = locked(&self.state);
-        let Some(file) = self.shared.get() else { return change(&mut state.gate) };
-        file.locked(|| {
-            let read: Gate = file.read().unwrap_or_default();
-            let mut gate = read;
-            let outcome = change(&mut gate);
-            if gate != read {
-                // If the file cannot be written, nothing is shared.
-                let _ = file.write(&gate);
-            }
-            outcome
-        })
+        state.not_before = state.not_before.max(Instant::now() + wait);
     }
 
     pub fn good(&self) {
@@ -176,21 +144,12 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn processes_of_a_folder_share_pauses_and_the_rate() {
-        let folder = tempfile::tempdir().unwrap();
-        let [one, other] = [(); 2].map(|()| Pace::new(8, Duration::from_millis(20)));
-        for pace in [&one, &other] {
-            pace.share(&folder.path().join("ledger/at.json")).unwrap();
-        }
-        let start = Instant::now();
-        for _ in 0..3 {
-            drop((one.turn().await, other.turn().await));
+    async fn requests_keep_the_rate_of_the_account() {
+        let (pace, start) = (Pace::new(8, Duration::from_millis(20)), Instant::now());
+        for _ in 0..6 {
+            drop(pace.turn().await);
         }
         assert!(start.elapsed() >= Duration::from_millis(100), "six requests, 20 ms apart: {:?}", start.elapsed());
-        one.pause(Duration::from_millis(150));
-        let start = Instant::now();
-        drop(other.turn().await);
-        assert!(start.elapsed() >= Duration::from_millis(140), "{:?}", start.elapsed());
     }
 
     #[tokio::test]

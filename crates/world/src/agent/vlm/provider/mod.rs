@@ -4,7 +4,6 @@
 //! rejected key, an unknown model, a malformed request) is reported at once. A refusal of the request's content counts
 //! as an answer, whatever the status.
 
-mod batch;
 pub mod concurrency;
 pub mod failure;
 mod parameter;
@@ -12,10 +11,7 @@ mod preflight;
 pub mod rate_limit;
 mod waiting;
 
-use std::io;
 use std::net::IpAddr;
-use std::path::Path;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 pub(super) use parameter::{Mend, refused};
@@ -27,8 +23,6 @@ pub(super) use waiting::Waiting;
 use super::models::Backend;
 use super::secrets::Secret;
 use super::wire_format::{Dialect, ModelAnswer};
-use crate::record::plan::slug;
-use batch::Batches;
 use concurrency::{Pace, Permit};
 use failure::{Failure, broken, failed, no_answer, server};
 pub use preflight::Unreachable;
@@ -89,7 +83,6 @@ pub struct Provider {
     secret: Option<Secret>,
     patience: Patience,
     pace: Pace,
-    batches: Option<Arc<Batches>>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -154,28 +147,13 @@ impl Provider {
             .user_agent(concat!("mirrorstats/", env!("CARGO_PKG_VERSION")))
             .build()
             .map_err(|fault| SetupError::Client(fault.to_string()))?;
-        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval), batches: None })
-    }
-
-    #[must_use]
-    pub fn in_batches(self) -> Self {
-        let (client, url, secret) = (self.client.clone(), self.url.clone(), self.secret.clone());
-        Self { batches: Some(Batches::new(client, url, self.dialect, secret, self.patience)), ..self }
+        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval) })
     }
 
     /// Opens a connection to the address and closes it again without sending anything.
     pub fn connect(&self) -> Result<(), Unreachable> {
         connect(&self.url, self.patience.connect_timeout)
             .map_err(|Unreachable { address, fault }| Unreachable { address: self.without_secret(&address), fault })
-    }
-
-    /// Shares the time of the next request with other processes, by a file in a folder. `key` identifies the account.
-    pub fn share(&self, folder: &Path, key: &str) -> io::Result<()> {
-        let address = self.url.origin().ascii_serialization();
-        let name = self.without_secret(&format!("at {address} {key}"));
-        let path = folder.join(slug(&name));
-        self.batches.as_ref().map_or(Ok(()), |batches| batches.share(&path.with_extension("batches.jsonl")))?;
-        self.pace.share(&path.with_extension("json"))
     }
 
     pub fn patience(&self) -> Patience {
@@ -190,12 +168,9 @@ impl Provider {
         self.pace.turn().await
     }
 
-    /// Sends a request once, in its turn. `id` is unique within a recording.
-    pub async fn ask(&self, turn: Permit<'_>, id: &str, body: &Value) -> Result<Received, Failure> {
-        let result = match &self.batches {
-            Some(batches) => batches.ask(id, body).await,
-            None => self.exchange(body).await,
-        };
+    /// Sends a request once, in its turn.
+    pub async fn ask(&self, turn: Permit<'_>, body: &Value) -> Result<Received, Failure> {
+        let result = self.exchange(body).await;
         drop(turn);
         match &result {
             Ok(_) => self.pace.good(),

@@ -4,16 +4,51 @@
 //! request that may have been billed keeps its reservation. The token limit is checked before every request; those in
 //! flight may still end.
 
-use std::io;
-use std::path::Path;
-use std::sync::{Arc, Mutex, OnceLock};
-use std::time::Duration;
+use std::sync::{Arc, Mutex};
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use tokio::sync::Notify;
 
-pub use super::ledger::Spend;
-use super::ledger::{Ledger, LedgerEntry, OtherProcesses};
 use crate::agent::locked;
+
+/// The spending.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Spend {
+    /// US dollars of the replies whose cost is known.
+    pub cost_usd: f64,
+    /// Replies whose cost is not known.
+    pub uncosted: u64,
+    /// Requests without an answer that may have been paid: timed out, broken off, or killed.
+    pub unanswered: u64,
+    /// US dollars at most of these requests, and of the replies whose cost is not known, as far as prices are known.
+    pub uncosted_usd_at_most: f64,
+    /// Tokens of requests and replies together.
+    pub tokens: u64,
+    /// Requests that went out.
+    pub requests: u64,
+}
+
+impl Spend {
+    pub(crate) fn add_unanswered(&mut self, at_most_usd: f64) {
+        self.unanswered += 1;
+        self.uncosted_usd_at_most += at_most_usd;
+    }
+
+    pub(crate) fn add_answer(&mut self, tokens: u64, cost_usd: Option<f64>, at_most_usd: f64) {
+        self.tokens = self.tokens.saturating_add(tokens);
+        if let Some(cost) = cost_usd {
+            self.cost_usd += cost;
+        } else {
+            self.uncosted += 1;
+            self.uncosted_usd_at_most += at_most_usd;
+        }
+    }
+
+    fn cost_at_most(&self) -> f64 {
+        self.cost_usd + self.uncosted_usd_at_most
+    }
+}
 
 /// The limits of a run; `None` for no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,19 +71,19 @@ pub struct Reached {
     next: String,
 }
 
-/// The account of a run, shared by all of its episodes and, through a ledger, by other processes.
+/// The account of a run, shared by all of its episodes.
 #[derive(Debug, Default)]
 pub struct Account {
     limits: Limits,
-    ledger: OnceLock<Ledger>,
     state: Mutex<SpendState>,
     changed: Notify,
 }
 
 #[derive(Debug, Default)]
 struct SpendState {
-    own: LedgerEntry,
-    others: OtherProcesses,
+    spend: Spend,
+    in_flight: u64,
+    reserved_usd: f64,
     /// Replies of known cost, their total cost, and the highest cost of one.
     costed: u64,
     costed_usd: f64,
@@ -72,13 +107,9 @@ pub struct Begun {
     left: u64,
 }
 
-/// The interval of checks whether other processes have spent less than they reserved.
-const AGAIN: Duration = Duration::from_millis(200);
-
 impl Account {
     pub fn new(limits: Limits, spent: Spend) -> Self {
-        let others = OtherProcesses { spend: spent, ..OtherProcesses::default() };
-        Self { limits, state: Mutex::new(SpendState { others, ..SpendState::default() }), ..Self::default() }
+        Self { limits, state: Mutex::new(SpendState { spend: spent, ..SpendState::default() }), ..Self::default() }
     }
 
     pub(crate) fn limits_cost(&self) -> bool {
@@ -86,27 +117,12 @@ impl Account {
     }
 
     pub(crate) fn begin_with(&self, spent: Spend) {
-        locked(&self.state).others.spend = spent;
+        locked(&self.state).spend = spent;
     }
 
-    /// Shares the account with other processes that record into a folder, by the ledger at this path. The first process
-    /// starts from `journals`; `patience` is the maximum time of a request in flight.
-    pub fn share<E: From<io::Error>>(
-        &self,
-        path: &Path,
-        patience: Duration,
-        journals: impl FnOnce() -> Result<Spend, E>,
-    ) -> Result<(), E> {
-        let ledger = Ledger::open(path, patience, journals)?;
-        // An account is shared once; a second call has no effect.
-        let _ = self.ledger.set(ledger);
-        self.post(|_| ());
-        Ok(())
-    }
-
-    /// The spending so far, by all processes if known.
+    /// The spending so far, over all starts.
     pub fn spend(&self) -> Spend {
-        self.post(|state| state.spend())
+        locked(&self.state).spend
     }
 
     /// Reserves this maximum cost for a request about to be sent. Waits for requests in flight if their final cost
@@ -115,10 +131,10 @@ impl Account {
         loop {
             // A request that ends between the attempt and the wait is noticed.
             let changed = self.changed.notified();
-            if let Some(at_most_usd) = self.post(|state| self.reserve_now(state, at_most_usd))? {
+            if let Some(at_most_usd) = self.reserve_now(&mut locked(&self.state), at_most_usd)? {
                 return Ok(Reserved { account: Arc::clone(self), at_most_usd, is_open: true });
             }
-            let _ = tokio::time::timeout(AGAIN, changed).await;
+            changed.await;
         }
     }
 
@@ -141,7 +157,7 @@ impl Account {
     }
 
     fn reserve_now(&self, state: &mut SpendState, at_most_usd: Option<f64>) -> Result<Option<f64>, Reached> {
-        let spend = state.spend();
+        let spend = state.spend;
         if let Some(limit) = self.limits.requests.filter(|limit| spend.requests >= *limit) {
             return Err(reached("requests", spend.requests.to_string(), limit.to_string()));
         }
@@ -150,24 +166,24 @@ impl Account {
         }
         // An answer may cost more than its stated maximum; the higher cost counts.
         let next = at_most_usd.map_or(0.0, |usd| usd.max(state.dearest_usd));
-        let all = spend.cost_at_most() + state.reserved_usd() + next;
+        let all = spend.cost_at_most() + state.reserved_usd + next;
         if let Some(limit) = self.limits.cost_usd.filter(|limit| all > *limit) {
-            if state.own.in_flight > 0 || state.others.is_waiting {
+            if state.in_flight > 0 {
                 return Ok(None);
             }
             let next = format!("; the next request may cost {}", dollars(next));
             return Err(Reached { next, ..reached("cost", dollars(spend.cost_at_most()), dollars(limit)) });
         }
-        state.own.spend.requests += 1;
-        state.own.in_flight += 1;
-        state.own.reserved_usd += next;
+        state.spend.requests += 1;
+        state.in_flight += 1;
+        state.reserved_usd += next;
         Ok(Some(next))
     }
 
     #[expect(clippy::cast_precision_loss, reason = "nobody counts 2^53 steps")]
     fn begin_now(&self, state: &mut SpendState, steps: u64, at_most_usd: Option<f64>) -> bool {
         let a_step = if state.costed == 0 { at_most_usd } else { Some(state.costed_usd / state.costed as f64) };
-        let (spend, steps_of_all) = (state.spend(), state.steps_left + steps);
+        let (spend, steps_of_all) = (state.spend, state.steps_left + steps);
         let cost = a_step.map(|a_step| spend.cost_at_most() + a_step * steps_of_all as f64);
         // Until the cost is known, only one episode is under way.
         let fits = self.limits.cost_usd.is_none_or(|limit| cost.is_some_and(|cost| cost <= limit))
@@ -178,28 +194,9 @@ impl Account {
         }
         false
     }
-
-    fn post<T>(&self, change: impl FnOnce(&mut SpendState) -> T) -> T {
-        let mut state = locked(&self.state);
-        let Some(ledger) = self.ledger.get() else { return change(&mut state) };
-        ledger.exchange(|others| {
-            state.others = others.unwrap_or(state.others);
-            (change(&mut state), state.own)
-        })
-    }
 }
 
 impl SpendState {
-    fn spend(&self) -> Spend {
-        let mut spend = self.others.spend;
-        spend.add(&self.own.spend);
-        spend
-    }
-
-    fn reserved_usd(&self) -> f64 {
-        self.own.reserved_usd + self.others.reserved_usd
-    }
-
     fn add_episode(&mut self, steps: u64) {
         self.begun += 1;
         self.steps_left += steps;
@@ -210,7 +207,7 @@ impl Reserved {
     pub fn answered(mut self, tokens: u64, cost_usd: Option<f64>) {
         let at_most_usd = self.at_most_usd;
         self.close(|state| {
-            state.own.spend.add_answer(tokens, cost_usd, at_most_usd);
+            state.spend.add_answer(tokens, cost_usd, at_most_usd);
             state.costed += u64::from(cost_usd.is_some());
             state.costed_usd += cost_usd.unwrap_or(0.0);
             state.dearest_usd = state.dearest_usd.max(cost_usd.unwrap_or(0.0));
@@ -224,12 +221,11 @@ impl Reserved {
 
     fn close(&mut self, outcome: impl FnOnce(&mut SpendState)) {
         self.is_open = false;
-        let reserved = self.at_most_usd;
-        self.account.post(|state| {
-            state.own.in_flight -= 1;
-            state.own.reserved_usd = if state.own.in_flight == 0 { 0.0 } else { state.own.reserved_usd - reserved };
-            outcome(state);
-        });
+        let mut state = locked(&self.account.state);
+        state.in_flight -= 1;
+        state.reserved_usd = if state.in_flight == 0 { 0.0 } else { state.reserved_usd - self.at_most_usd };
+        outcome(&mut state);
+        drop(state);
         self.account.changed.notify_waiters();
     }
 }
@@ -238,7 +234,7 @@ impl Drop for Reserved {
     fn drop(&mut self) {
         if self.is_open {
             let at_most_usd = self.at_most_usd;
-            self.close(|state| state.own.spend.add_unanswered(at_most_usd));
+            self.close(|state| state.spend.add_unanswered(at_most_usd));
         }
     }
 }

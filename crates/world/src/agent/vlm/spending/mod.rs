@@ -1,4 +1,2 @@
 pub mod estimate;
-mod ledger;
 pub mod limits;
-pub(super) mod shared_file;

@@ -158,6 +158,10 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
 #[test]
 fn refusals_and_empty_answers_have_each_providers_own_form() {
     let openai = |choice| ok(&json!({ "choices": [choice], "usage": {} }));
+    let called = |text: &str, arguments: &str| {
+        let function = json!({ "name": "reply", "arguments": arguments });
+        json!({ "content": text, "tool_calls": [{ "type": "function", "function": function }] })
+    };
     check(
         Dialect::OpenaiChat,
         vec![
@@ -170,9 +174,21 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
             ("null", openai(json!({ "finish_reason": "stop", "message": { "content": null } })), Status::Empty),
             ("no choice", http("200 OK", JSON, br#"{"choices": [], "usage": {}}"#), Status::Empty),
             ("half an answer", ok(&spoken(Dialect::OpenaiChat, &decision("w"), "error")), Status::ServerError),
+            (
+                "parts of reasoning alone",
+                openai(json!({ "message": { "content": [{ "type": "reasoning_text", "text": decision("w") }] } })),
+                Status::Empty,
+            ),
+            ("a call beside a text", openai(json!({ "message": called("I answer:", &decision("w")) })), Status::Repaired),
+            (
+                "a call beside thoughts",
+                openai(json!({ "message": called("<think>{1}</think>", &decision("w")) })),
+                Status::Repaired,
+            ),
             ("choices of another kind", ok(&json!({ "choices": null })), Status::ServerError),
         ],
     );
+    let part = |part| ok(&json!({ "candidates": [{ "content": { "parts": [part] }, "finishReason": "STOP" }] }));
     let blocked = json!({ "promptFeedback": { "blockReason": "SAFETY" }, "usageMetadata": {} });
     check(
         Dialect::Gemini,
@@ -183,6 +199,12 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
             ("no content", ok(&json!({ "candidates": [{ "finishReason": "STOP" }] })), Status::Empty),
             ("no candidate", ok(&json!({ "candidates": [], "usageMetadata": {} })), Status::Empty),
             ("thoughts alone", ok(&spoken(Dialect::Gemini, "", "MAX_TOKENS")), Status::Truncated),
+            ("a part of thoughts", part(json!({ "thought": "true", "text": decision("w") })), Status::Empty),
+            (
+                "a call in thoughts",
+                part(json!({ "thought": true, "functionCall": { "name": "reply", "args": { "action": "w" } } })),
+                Status::Empty,
+            ),
         ],
     );
     let anthropic = |content, reason| ok(&json!({ "content": content, "stop_reason": reason }));

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BooleanArray, Decimal128Array, Float32Array, Float64Array, Int64Array, NullArray, RecordBatch,
+    ArrayRef, BooleanArray, Date32Array, Decimal128Array, Float32Array, Float64Array, Int64Array, NullArray, RecordBatch,
     StringArray, TimestampMicrosecondArray, UInt64Array,
 };
 use arrow::datatypes::Float16Type;
@@ -239,8 +239,9 @@ fn folders_may_have_columns() {
     assert_eq!(scored("runs"), "e,act,reach,1,1,1");
     #[cfg(feature = "polars")]
     {
-        let told = run(at, &["query", "select model from steps", "runs", "--definitions", "arms.toml"]).refused();
-        assert!(told.contains("expected the column `model` in the file, found it in the name of a folder"), "{told}");
+        let sql = "select distinct model, run from steps";
+        let told = run(at, &["query", sql, "runs", "--definitions", "arms.toml", "--format", "csv"]).done();
+        assert_eq!(told, "model,run\nact,1\n");
     }
     write_rows(
         &part.join("part-0.parquet"),
@@ -252,6 +253,36 @@ fn folders_may_have_columns() {
     fs::write(at.join("open.toml"), "domain = \"arms\"\n[metric.N]\nvalue = \"length()\"\n").unwrap();
     let told = run(at, &["score", "runs", "--definitions", "open.toml"]).refused();
     assert!(told.contains("expected `act`, as in the name of the folder\n  found `bee`"), "{told}");
+    #[cfg(feature = "polars")]
+    {
+        let told = run(at, &["query", "select model from steps", "runs", "--definitions", "open.toml"]).refused();
+        assert!(told.contains("expected `act` in the column `model`, as in its folder"), "{told}");
+    }
+}
+
+#[cfg(feature = "polars")]
+#[test]
+fn queries_of_other_types_answer_as_duckdb_or_are_refused() {
+    let folder = folder();
+    let at = folder.path();
+    let columns = vec![
+        ("f", Arc::new(Float32Array::from(vec![0.1, 0.5])) as ArrayRef),
+        ("d", Arc::new(Date32Array::from(vec![1, 2]))),
+    ];
+    write_rows(&at.join("in.parquet"), &[table(columns)], None);
+    let asked = |sql: &str| run(at, &["query", sql, "in.parquet", "--definitions", "arms.toml", "--format", "csv"]);
+    for (sql, expected) in [
+        ("select max(f) as m, avg(f) as a from steps where f > 0", "m,a\n0.5,0.30000000074505806\n"),
+        ("select f from steps where f >= 0.5", "f\n0.5\n"),
+        ("select count(*) as n from steps where f = cast(f as double)", "n\n2\n"),
+        ("select * exclude (d, f, episode_id, experiment, seed, model) from steps where t = 1", "run,t\n1,1\n"),
+    ] {
+        assert_eq!(asked(sql).done(), expected, "{sql}");
+    }
+    for sql in ["select f = 0.1 from steps", "select f + 1 from steps", "select d from steps", "select * from steps"] {
+        let told = asked(sql).refused();
+        assert!(told.contains("`query` does not support") && told.contains("run it in DuckDB: duckdb -c"), "{told}");
+    }
 }
 
 #[test]

@@ -15,9 +15,12 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
+use trace::identification::VERSION;
+use trace::inputs::Input;
+use trace::open::TraceFile;
 
 use crate::harness::program::run_with_input as run;
-use crate::harness::traces::score_values;
+use crate::harness::traces::{score_values, texts};
 
 /// A step of an episode of E1 with only the required keys.
 fn step(episode: &str, t: i64) -> Value {
@@ -71,6 +74,30 @@ fn steps_become_a_trace_that_scores() {
     assert_eq!(answer.stdout, "imported 1 episode, 3 steps into runs.parquet\n");
     let scores = scores(folder.path(), "runs.parquet");
     assert_eq!(scores[1][..8], ["a", "mine", "E1", "1", "1", "1", "3", "1"]);
+}
+
+#[test]
+fn attributions_are_read_from_texts_where_a_step_has_no_key_for_them() {
+    let said = |t: i64, text: Value| {
+        let mut step = step_with("a", t, json!({ "identification": text }));
+        step.as_object_mut().unwrap().remove("self_color");
+        step
+    };
+    let given = step_with("a", 4, json!({ "identification": "I am red", "self_color": "blue" }));
+    let steps = [said(1, json!("I am the crimson robot.")), said(2, json!("not red")), said(3, Value::Null), given];
+    let (bytes, _) = imported(lines(&steps));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.parquet");
+    fs::write(&path, bytes).unwrap();
+    let expected = [Some("red"), Some("unknown"), None, Some("blue")].map(|color| color.map(str::to_owned));
+    assert_eq!(texts(&path, "self_color"), expected);
+    let recording = TraceFile::open(&Input::new(&path)).unwrap().recording();
+    assert_eq!(recording["identification_version"], json!(VERSION));
+    // Without a text the key is required.
+    let mut neither = step("a", 1);
+    neither.as_object_mut().unwrap().remove("self_color");
+    let refused = run(folder.path(), &["import", "-", "-o", "y.parquet"], lines(&[neither]));
+    assert!(refused.code == 2 && refused.stderr.contains("`self_color`"), "{}", refused.stderr);
 }
 
 #[test]

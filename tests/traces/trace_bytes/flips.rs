@@ -5,6 +5,11 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_writer::ArrowWriterOptions;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
 use trace::diagnostic::Severity;
 use trace::episode::Episode;
 use trace::inputs::Input;
@@ -120,8 +125,16 @@ fn unchecked() -> Vec<u8> {
     let path = folder.path().join("trace.parquet");
     fs::write(&path, trace()).unwrap();
     let rows = traces::rows(&path);
-    traces::write_rows(&path, &[rows], None);
-    fs::read(&path).unwrap()
+    let pair = |key: &str, value: &str| KeyValue::new(key.to_owned(), value.to_owned());
+    let pairs = vec![pair("mirrorstats.schema_version", "2"), pair("mirrorstats.writer", "mirrorstats 0.1.0")];
+    let properties = WriterProperties::builder()
+        .set_key_value_metadata(Some(pairs))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .build();
+    let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
+    let mut writer = ArrowWriter::try_new_with_options(Vec::new(), rows.schema(), options).unwrap();
+    writer.write(&rows).unwrap();
+    writer.into_inner().unwrap()
 }
 
 #[test]

@@ -9,11 +9,11 @@ use arrow::compute::concat;
 use arrow::datatypes::DataType;
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, RowSelection, RowSelector};
 use parquet::basic::Type as Physical;
 
 use super::budget::check_names;
-use super::footer::plain;
+use super::flat::CheckedRows;
 use super::footer::trace_file::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
 use super::statistics::{Chunk, Seen};
@@ -89,9 +89,8 @@ enum ColumnSource {
 }
 
 struct Library {
-    reader: ParquetRecordBatchReader,
+    reader: CheckedRows,
     held: Vec<ArrayRef>,
-    slot: FaultSlot,
 }
 
 impl Library {
@@ -153,18 +152,12 @@ impl<'a> RowGroup<'a> {
     }
 
     fn library(&self, at: usize, root: usize) -> Result<ColumnSource, Box<Finding>> {
-        let (store, slot) = (self.file.store()?, FaultSlot::default());
-        let made = contained(|| self.reader(store, root, self.first, &slot));
-        match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
-            Ok(reader) => Ok(ColumnSource::Library(Box::new(Library { reader, held: Vec::new(), slot }))),
-            Err(error) => Err(self.damaged(at, &slot, &error)),
-        }
+        let reader = self.reader(root, self.first).map_err(|finding| self.placed(at, *finding))?;
+        Ok(ColumnSource::Library(Box::new(Library { reader, held: Vec::new() })))
     }
 
-    /// The finding for a column that the library cannot decode, or whose pages are refused.
-    fn damaged(&self, at: usize, slot: &FaultSlot, error: &str) -> Box<Finding> {
-        let finding = damaged(self.file.name(), slot, error).in_row_group(self.index);
-        Box::new(finding.in_column(&self.layout.columns[at].name))
+    fn placed(&self, at: usize, finding: Finding) -> Box<Finding> {
+        Box::new(finding.in_row_group(self.index).in_column(&self.layout.columns[at].name))
     }
 
     fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
@@ -258,14 +251,9 @@ impl<'a> RowGroup<'a> {
                 let column = library.take(count);
                 return column.map(Column::Flat).map_err(|error| corrupt(self.file, self.index, &error.to_string()));
             }
-            let batch = contained(|| library.reader.next())
-                .and_then(|next| next.transpose().map_err(|error| error.to_string()));
-            let batch = match batch {
-                Ok(batch) => batch,
-                Err(error) => {
-                    let slot = Arc::clone(&library.slot);
-                    return Err(self.damaged(at, &slot, &error));
-                }
+            let batch = match library.reader.next() {
+                Some(Err(finding)) => return Err(self.placed(at, *finding)),
+                batch => batch.and_then(Result::ok),
             };
             let Some(batch) = batch else {
                 if count == 0 {
@@ -309,34 +297,27 @@ impl<'a> RowGroup<'a> {
 
     fn anew(&self, at: usize, first: usize) -> Option<Column> {
         let root = root(self.file, self.layout, at)?;
-        let (store, slot) = (self.file.store().ok()?, FaultSlot::default());
-        let read = || self.reader(store, root, first, &slot).ok()?.next()?.ok();
-        let decoded = contained(read).ok()?;
-        normal_column(decoded?.column(0), &held_as(self.layout.columns[at].kind)).ok().map(Column::Flat)
+        let decoded = self.reader(root, first).ok()?.next()?.ok()?;
+        normal_column(decoded.column(0), &held_as(self.layout.columns[at].kind)).ok().map(Column::Flat)
     }
 
-    fn reader(
-        &self,
-        store: Store,
-        root: usize,
-        first: usize,
-        slot: &FaultSlot,
-    ) -> parquet::errors::Result<ParquetRecordBatchReader> {
+    /// The rows of a column from `first` on, by the library.
+    fn reader(&self, root: usize, first: usize) -> Result<CheckedRows, Box<Finding>> {
         let Readable { footer, chunks } = &*self.readable;
         let rows = rows_of(footer.metadata().row_group(self.index));
-        let (metadata, checksums, slot) = (Arc::clone(footer.metadata()), chunks.clone(), Arc::clone(slot));
         let library = parquet_pages::Library {
-            store,
-            metadata,
-            checksums,
+            store: self.file.store()?,
+            metadata: Arc::clone(footer.metadata()),
+            checksums: chunks.clone(),
             row_groups: vec![self.index],
-            slot,
+            slot: FaultSlot::default(),
             writes_out: false,
         };
         let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
         let selection = (first > 0).then(|| RowSelection::from(rest));
         let column = ProjectionMask::roots(footer.parquet_schema(), [root]);
-        library.reader(column, Some(footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
+        let batch = rows.clamp(1, self.at_a_time);
+        CheckedRows::open(self.file.name(), &library, column, Some(footer.schema().fields()), batch, selection)
     }
 }
 

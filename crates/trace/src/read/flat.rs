@@ -5,8 +5,7 @@ use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::datatypes::{DataType, FieldRef, Fields};
-use arrow::error::ArrowError;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, RowSelection};
 use parquet::arrow::{ProjectionMask, parquet_to_arrow_schema};
 use parquet::file::metadata::ParquetMetaData;
 
@@ -25,13 +24,41 @@ const BATCH_ROWS: usize = 1024;
 pub type TableFile = File;
 
 /// Rows of a file without nested columns.
-pub struct FlatRows(TableRows);
+pub struct FlatRows(CheckedRows);
 
-/// Rows of some columns of a file.
-pub(crate) struct TableRows {
+/// Rows from the library's reader. A panic or an error of the library is a finding of the file.
+pub(crate) struct CheckedRows {
     file: String,
     reader: ParquetRecordBatchReader,
     slot: FaultSlot,
+}
+
+impl CheckedRows {
+    pub(crate) fn open(
+        file: &str,
+        library: &Library,
+        columns: ProjectionMask,
+        fields: Option<&Fields>,
+        batch: usize,
+        selection: Option<RowSelection>,
+    ) -> Result<Self, Box<Finding>> {
+        let slot = Arc::clone(&library.slot);
+        let made = contained(|| library.reader(columns, fields, batch, selection));
+        match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
+            Ok(reader) => Ok(Self { file: file.to_owned(), reader, slot }),
+            Err(error) => Err(Box::new(damaged(file, &slot, &error))),
+        }
+    }
+}
+
+impl Iterator for CheckedRows {
+    type Item = Result<RecordBatch, Box<Finding>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let next =
+            contained(|| self.reader.next()).and_then(|next| next.transpose().map_err(|error| error.to_string()));
+        next.map_err(|error| Box::new(damaged(&self.file, &self.slot, &error))).transpose()
+    }
 }
 
 impl FlatRows {
@@ -41,39 +68,35 @@ impl FlatRows {
             return Err(words(&is_nested("", &nested.path().parts()[0])));
         }
         // The caller has verified all checksums of such a file before.
-        let rows = TableRows::open("", file, metadata, ChunkChecksums::default(), None);
+        let rows = table_rows("", file, metadata, ChunkChecksums::default(), None);
         rows.map(Self).map_err(|finding| words(&finding))
     }
 }
 
-impl TableRows {
-    /// The rows of these columns, by their positions; of all columns if `None`.
-    pub(crate) fn open(
-        name: &str,
-        file: TableFile,
-        metadata: Arc<ParquetMetaData>,
-        checksums: ChunkChecksums,
-        roots: Option<&[usize]>,
-    ) -> Result<Self, Box<Finding>> {
-        let bytes = file.metadata().map_err(|error| Finding::unreadable(name, &error))?.len();
-        let schema = metadata.file_metadata().schema_descr_ptr();
-        MOST_COLUMNS.check(schema.num_columns() as u64).map_err(|exceeded| Finding::over_budget(name, &exceeded))?;
-        if let Some(fault) = bounds::fault(name, bytes, &metadata).filter(|fault| fault.code != Code::NoEpisodes) {
-            return Err(Box::new(fault));
-        }
-        let slot = FaultSlot::default();
-        let damaged = |words: String| Box::new(damaged(name, &slot, &words));
-        let fields = contained(|| parquet_to_arrow_schema(&schema, None)).map_err(damaged)?;
-        let fields: Fields = fields.map_err(|error| damaged(plain(&error)))?.fields().iter().map(with_keys).collect();
-        let row_groups = (0..metadata.num_row_groups()).collect();
-        let store = Store::new(file, Arc::new(Expansion::new(bytes)));
-        let library = Library { store, metadata, checksums, row_groups, slot: Arc::clone(&slot), writes_out: true };
-        let mask =
-            roots.map_or_else(ProjectionMask::all, |roots| ProjectionMask::roots(&schema, roots.iter().copied()));
-        let reader = contained(|| library.reader(mask, Some(&fields), BATCH_ROWS, None)).map_err(damaged)?;
-        let reader = reader.map_err(|error| damaged(plain(&error)))?;
-        Ok(Self { file: name.to_owned(), reader, slot })
+/// The rows of these columns of a file, by their positions; of all columns if `None`.
+pub(crate) fn table_rows(
+    name: &str,
+    file: TableFile,
+    metadata: Arc<ParquetMetaData>,
+    checksums: ChunkChecksums,
+    roots: Option<&[usize]>,
+) -> Result<CheckedRows, Box<Finding>> {
+    let bytes = file.metadata().map_err(|error| Finding::unreadable(name, &error))?.len();
+    let schema = metadata.file_metadata().schema_descr_ptr();
+    MOST_COLUMNS.check(schema.num_columns() as u64).map_err(|exceeded| Finding::over_budget(name, &exceeded))?;
+    if let Some(fault) = bounds::fault(name, bytes, &metadata).filter(|fault| fault.code != Code::NoEpisodes) {
+        return Err(Box::new(fault));
     }
+    let slot = FaultSlot::default();
+    let fields = contained(|| parquet_to_arrow_schema(&schema, None))
+        .and_then(|fields| fields.map_err(|error| plain(&error)))
+        .map_err(|error| damaged(name, &slot, &error))?;
+    let fields: Fields = fields.fields().iter().map(with_keys).collect();
+    let row_groups = (0..metadata.num_row_groups()).collect();
+    let store = Store::new(file, Arc::new(Expansion::new(bytes)));
+    let library = Library { store, metadata, checksums, row_groups, slot, writes_out: true };
+    let mask = roots.map_or_else(ProjectionMask::all, |roots| ProjectionMask::roots(&schema, roots.iter().copied()));
+    CheckedRows::open(name, &library, mask, Some(&fields), BATCH_ROWS, None)
 }
 
 /// Texts inside of nested columns as keys into a dictionary: the pages of nested columns are not checked for texts that
@@ -100,16 +123,6 @@ impl Iterator for FlatRows {
 
     fn next(&mut self) -> Option<Self::Item> {
         self.0.next().map(|batch| batch.map_err(|finding| words(&finding)))
-    }
-}
-
-impl Iterator for TableRows {
-    type Item = Result<RecordBatch, Box<Finding>>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let batch =
-            contained(|| self.reader.next()).unwrap_or_else(|panic| Some(Err(ArrowError::ParquetError(panic))))?;
-        Some(batch.map_err(|error| Box::new(damaged(&self.file, &self.slot, &error.to_string()))))
     }
 }
 

@@ -13,15 +13,12 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch
 use arrow::compute::{CastOptions, cast, cast_with_options, filter_record_batch};
 use arrow::datatypes::{DataType, Field, Fields, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
+use super::flat::CheckedRows;
 use super::footer::folder_columns::FolderColumn;
-use super::footer::plain;
 use super::footer::trace_file::{Readable, TraceFile};
 use super::open::TraceSet;
 use super::projection::Layout;
-use super::verify::damaged;
-use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::schema::{Kind, Stored};
@@ -201,25 +198,20 @@ impl Part {
     }
 
     fn send(self, shape: &StepSelection, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
-        let (name, folders) = (self.name.clone(), self.folders.clone());
-        let (mut reader, slot) = self.reader(&shape.schema)?;
-        loop {
-            let next = contained(|| reader.next())
-                .and_then(|next| next.transpose().map_err(|error| error.to_string()))
-                .map_err(|error| damaged(&name, &slot, &error))?;
-            let Some(rows) = next else { return Ok(()) };
-            if sender.send(Ok(Some(shape.complete(&rows, &folders)?))).is_err() {
-                return Ok(());
+        let folders = self.folders.clone();
+        for rows in self.reader(&shape.schema)? {
+            if sender.send(Ok(Some(shape.complete(&rows?, &folders)?))).is_err() {
+                break;
             }
         }
+        Ok(())
     }
 
-    fn reader(self, schema: &Schema) -> Result<(ParquetRecordBatchReader, FaultSlot), Box<Finding>> {
+    fn reader(self, schema: &Schema) -> Result<CheckedRows, Box<Finding>> {
         let Self { name, path, readable, expansion, row_group, .. } = self;
         let file = input::open(&path).map_err(|error| Finding::unreadable(&name, &error))?;
         let store = Store::new(file, expansion);
         let metadata = Arc::clone(readable.footer.metadata());
-        let (checksums, slot) = (readable.chunks.clone(), FaultSlot::default());
         let described = metadata.file_metadata().schema_descr();
         let wanted = described.columns().iter().enumerate().filter(|(_, column)| {
             let path = column.path().parts();
@@ -232,14 +224,11 @@ impl Part {
         let library = Library {
             store,
             metadata: Arc::clone(&metadata),
-            checksums,
+            checksums: readable.chunks.clone(),
             row_groups: vec![row_group],
-            slot: Arc::clone(&slot),
+            slot: FaultSlot::default(),
             writes_out: !has_views,
         };
-        match contained(|| library.reader(columns, fields.as_ref(), batch, None).map_err(|error| plain(&error))) {
-            Ok(Ok(rows)) => Ok((rows, slot)),
-            Ok(Err(error)) | Err(error) => Err(Box::new(damaged(&name, &slot, &error))),
-        }
+        CheckedRows::open(&name, &library, columns, fields.as_ref(), batch, None)
     }
 }

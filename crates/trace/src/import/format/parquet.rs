@@ -10,7 +10,7 @@ use super::RowSink;
 use crate::diagnostic::{Code, Finding};
 use crate::import::error::{Fault, ImportError};
 use crate::read::budget::most_imported;
-use crate::read::flat::TableRows;
+use crate::read::flat::table_rows;
 use crate::read::footer::{Extent, Footer, footer_of};
 
 pub(super) fn read(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
@@ -56,7 +56,7 @@ pub(super) fn each_batch_of(
     if let Err(exceeded) = most_imported(bytes).check(count.saturating_mul(wanted.len() as u64)) {
         return Err(refused(rows, Finding::over_budget(&rows.file, &exceeded)));
     }
-    let opened = TableRows::open(&rows.file, file, Arc::new(metadata), chunks, Some(wanted.as_slice()));
+    let opened = table_rows(&rows.file, file, Arc::new(metadata), chunks, Some(wanted.as_slice()));
     for batch in opened.map_err(|finding| refused(rows, *finding))? {
         add(batch.map_err(|finding| refused(rows, *finding))?, rows)?;
     }

@@ -170,20 +170,22 @@ fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
 }
 
+/// The value in the name of a folder that stands for null.
+pub(crate) const NULL_FOLDER: &str = "__HIVE_DEFAULT_PARTITION__";
+
 /// The columns in the folder names of a path, as in partitioned tables of Spark and others: `experiment=E1`.
 ///
 /// `None` is the null of such a table. `%41` spells a character that a file system might refuse.
 pub fn folder_values(path: &Path) -> Vec<(String, Option<String>)> {
-    const NULL: &str = "__HIVE_DEFAULT_PARTITION__";
     let folders = path.parent().into_iter().flat_map(Path::components);
     let pair = |folder: Component| {
         let (name, value) = folder.as_os_str().to_str()?.split_once('=')?;
-        Some((unescaped(name), (value != NULL).then(|| unescaped(value))))
+        Some((unescaped(name), (value != NULL_FOLDER).then(|| unescaped(value))))
     };
     folders.filter_map(pair).collect()
 }
 
-/// `%41` as `A`; other text is unchanged.
+/// `%41` as `A`; other text is unchanged, and so is text that would not be UTF-8, such as `%FF`.
 fn unescaped(text: &str) -> String {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();
@@ -193,7 +195,7 @@ fn unescaped(text: &str) -> String {
         bytes.push(spelled.unwrap_or(first));
         rest = if spelled.is_some() { &others[2..] } else { others };
     }
-    String::from_utf8_lossy(&bytes).into_owned()
+    String::from_utf8(bytes).unwrap_or_else(|_| text.to_owned())
 }
 
 fn display_name(path: &Path) -> String {
@@ -257,9 +259,15 @@ mod tests {
 
     #[test]
     fn folders_may_name_columns() {
-        let path = Path::new("out/experiment=E1/model=a%2Fb%25 50%/run=__HIVE_DEFAULT_PARTITION__/x=1.parquet");
+        let path =
+            Path::new("out/experiment=E1/model=a%2Fb%25 50%/task=%FF%41/run=__HIVE_DEFAULT_PARTITION__/x=1.parquet");
         let pair = |name: &str, value: Option<&str>| (name.to_owned(), value.map(str::to_owned));
-        let expected = [pair("experiment", Some("E1")), pair("model", Some("a/b% 50%")), pair("run", None)];
+        let expected = [
+            pair("experiment", Some("E1")),
+            pair("model", Some("a/b% 50%")),
+            pair("task", Some("%FF%41")),
+            pair("run", None),
+        ];
         assert_eq!(folder_values(path), expected);
     }
 

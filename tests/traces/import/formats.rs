@@ -58,7 +58,7 @@ fn a_csv_column_has_the_type_that_fits_all_cells() {
     #[cfg(feature = "polars")]
     assert_eq!(
         queried(at, "episode_id, t, run, success, reward, code, note"),
-        ["7,1,7,false,0.5,007,\"a, \"\"b\"\"\"", "7,2,7,true,1.0,12,", "7,3,7,,,1e3,x"]
+        ["7,1,7,false,0.5,007,\"a, \"\"b\"\"\"", "7,2,7,true,1.0,12,", "7,3,7,,NaN,1e3,x"]
     );
     let declared = recording(&at.join("x.parquet"));
     assert_eq!(declared["formats"], json!(["csv"]));

@@ -242,6 +242,68 @@ fn scores_are_the_numbers_that_inspect_counts() {
 }
 
 #[test]
+fn samples_and_attempts_that_are_no_episodes_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let retries = json!([{ "events": [model(&json!({})), tool(&json!({}))] }, { "message": "x" }]);
+    let one = sample(&json!(1), &[model(&json!({}))], &json!({ "error_retries": retries }));
+    let log = |status: &str, ids: &[Value]| {
+        let mut log = merged(header(ids), &json!({ "status": status, "samples": [one] }));
+        log["eval"]["config"] = json!({ "epochs": 2 });
+        fs::write(at.join("log.json"), log.to_string()).unwrap();
+        import(at, "log.json", &[]).ends(0)
+    };
+    let told = log("error", &[json!("a"), json!(1), json!("b")]);
+    let absent = "left out: 5 samples that the log lists and lacks, the first \"a\" in epoch 1; its status is `error`";
+    assert!(told.stderr.contains(absent), "{}", told.stderr);
+    assert!(told.stderr.contains("left out: 2 events of attempts that failed"), "{}", told.stderr);
+    assert!(told.stdout.starts_with("imported 1 episode, 1 step"), "{}", told.stdout);
+    let told = log("cancelled", &[]).stderr;
+    assert!(told.contains("end of a log, whose status is `cancelled`: samples may be missing"), "{told}");
+    json_log(&at.join("log.json"), &[one]);
+    let told = import(at, "log.json", &[]).ends(0).stderr;
+    assert!(!told.contains("lacks") && !told.contains("status"), "{told}");
+    archive(&at.join("log.eval"), &[json!(1), json!(2)], &[member(sample(&json!(1), &[], &json!({})))]);
+    let told = import(at, "log.eval", &[]).ends(0).stderr;
+    assert!(told.contains("left out: 1 samples that the log lists and lacks, the first 2 in epoch 1"), "{told}");
+}
+
+#[test]
+fn counts_and_shapes_are_taken_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let import_one = |more: &Value, event: &Value| {
+        json_log(&at.join("log.json"), &[sample(&json!(1), &[model(event)], more)]);
+        import(at, "log.json", &[])
+    };
+    let usage = |usage: Value| json!({ "output": { "usage": usage } });
+    import_one(&json!({}), &usage(json!({ "input_tokens": 100.0, "output_tokens": 0, "total_cost": 2.5e-6 }))).done();
+    assert_eq!(queried(at, "prompt_tokens, completion_tokens, cost_micro_usd"), ["100,0,3"]);
+    let none = || json!({});
+    for (more, event, expected, found) in [
+        (none(), usage(json!({ "output_tokens": -5 })), "a whole number from 0 to", "-5"),
+        (none(), usage(json!({ "input_tokens": 1.5 })), "a whole number from 0 to", "1.5"),
+        (none(), usage(json!({ "input_tokens": "9" })), "a whole number from 0 to", "the text `9`"),
+        (
+            none(),
+            usage(json!({ "total_cost": 1e300 })),
+            "a number from 0 to 9007199254.740992 as `total_cost`",
+            "1e300",
+        ),
+        (none(), json!({ "working_time": -1 }), "a number from 0 to", "-1"),
+        (none(), usage(json!([1])), "an object as the `usage`", "a list"),
+        (none(), json!({ "output": [1] }), "an object as the `output`", "a list"),
+        (json!({ "scores": [1] }), none(), "an object as the `scores`", "a list"),
+        (json!({ "scores": { "s": 1 } }), none(), "an object with `value`", "1"),
+        (json!({ "events": {} }), none(), "a list as `events`", "an object"),
+    ] {
+        let told = import_one(&more, &event).refused();
+        assert!(told.contains(&format!("log.json, sample 1\n  expected {expected}")), "{told}");
+        assert!(told.contains(&format!("found {found}\n")), "{told}");
+    }
+}
+
+#[test]
 fn keys_of_older_logs_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

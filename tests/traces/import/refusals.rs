@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::{Value, json};
 
-use super::{lines, run, step, step_with};
+use super::{imported, lines, run, step, step_with};
 
 /// The message that refuses these lines.
 #[track_caller]
@@ -228,7 +228,16 @@ fn custom_keys_with_changing_types_are_refused() {
     assert!(said(json!(1), json!({ "a": 1 })).contains("found an object\n"));
     let large = said(json!(9_007_199_254_740_993_i64), json!(0.5));
     assert!(large.contains("line 1, key `own`\n") && large.contains("found 9007199254740993\n"), "{large}");
-    assert!(said(json!(u64::MAX), json!(1)).contains("expected an integer of at most 9223372036854775807\n"));
+    let unheld = "expected an integer of at most 9223372036854775807, or a number that 64-bit floats hold\n  found";
+    assert!(said(json!(u64::MAX), json!(1)).contains(&format!("line 1, key `own`\n  {unheld} 18446744073709551615\n")));
+    let own = |number: &str| lines(&[step_with("a", 1, json!({ "own": "@" }))]).replace("\"@\"", number);
+    for number in ["100000000000000000000000000001", "-9223372036854775809", "9007199254740993.01", "1e-400"] {
+        let told = refused(own(number));
+        assert!(told.contains(&format!("line 1, key `own`\n  {unheld} {number}\n")), "{told}");
+    }
+    for number in ["33.18", "0.30000000000000004", "1e29", "9007199254740994.0", "0.10000000000000000555"] {
+        imported(own(number));
+    }
     let many: serde_json::Map<String, Value> = (0..1001).map(|at| (format!("k{at}"), json!(at))).collect();
     assert!(refused(lines(&[step_with("a", 1, Value::Object(many))])).contains("at most 1000 keys"));
 }

@@ -6,8 +6,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BooleanArray, Date32Array, Decimal128Array, Float32Array, Float64Array, Int64Array, NullArray, RecordBatch,
-    StringArray, TimestampMicrosecondArray, UInt64Array,
+    ArrayRef, BinaryArray, BooleanArray, Date32Array, Decimal128Array, DurationMillisecondArray, Float32Array,
+    Float64Array, Int64Array, NullArray, RecordBatch, StringArray, TimestampMicrosecondArray, UInt64Array,
 };
 use arrow::datatypes::Float16Type;
 
@@ -104,7 +104,7 @@ fn numbers_of_any_width_keep_their_value() {
 }
 
 #[test]
-fn times_and_decimal_numbers_are_taken() {
+fn times_texts_and_decimal_numbers_are_taken() {
     let folder = folder();
     let times = TimestampMicrosecondArray::from(vec![Some(1_767_225_600_000_000), None]);
     let found = imported(
@@ -113,6 +113,7 @@ fn times_and_decimal_numbers_are_taken() {
             ("utc", Arc::new(times.clone().with_timezone("UTC"))),
             ("zone", Arc::new(times.clone().with_timezone("Europe/Berlin"))),
             ("local", Arc::new(times)),
+            ("bytes", Arc::new(BinaryArray::from(vec![Some("é".as_bytes()), None]))),
             ("price", Arc::new(Decimal128Array::from(vec![125, 300]).with_precision_and_scale(10, 2).unwrap())),
         ],
     );
@@ -121,8 +122,8 @@ fn times_and_decimal_numbers_are_taken() {
         column.value(0).to_owned()
     };
     assert_eq!(
-        [text("utc"), text("zone"), text("local")],
-        ["2026-01-01T00:00:00Z", "2026-01-01T00:00:00Z", "2026-01-01T00:00:00"]
+        [text("utc"), text("zone"), text("local"), text("bytes")],
+        ["2026-01-01T00:00:00Z", "2026-01-01T00:00:00Z", "2026-01-01T00:00:00", "é"]
     );
     let price = found.column_by_name("price").unwrap().as_any().downcast_ref::<Float64Array>().unwrap();
     assert_eq!(price.values().as_ref(), [1.25, 3.0]);
@@ -138,6 +139,30 @@ fn values_that_do_not_fit_are_refused_by_row_and_column() {
     };
     let told = refused(vec![("big", Arc::new(UInt64Array::from(vec![1, u64::MAX])) as ArrayRef)]);
     assert!(told.contains("in.parquet, row 2, key `big`") && told.contains("found 18446744073709551615"), "{told}");
+    let decimals = |first: i128| {
+        let values = Decimal128Array::from(vec![first, 900_719_925_474_099_301]);
+        vec![("own", Arc::new(values.with_precision_and_scale(38, 2).unwrap()) as ArrayRef)]
+    };
+    for (columns, words) in [
+        (decimals(1), "row 2, key `own`\n  expected an integer of at most"),
+        (decimals(1_234_567_890_123_456_789_012), "found 12345678901234567890.12"),
+        (
+            vec![("bytes", Arc::new(BinaryArray::from(vec![&b"red"[..], b"a\xff"])))],
+            "row 2, key `bytes`\n  expected text",
+        ),
+        (
+            vec![("time", Arc::new(TimestampMicrosecondArray::from(vec![0, i64::MAX])))],
+            "row 2, key `time`\n  expected a value of the type Timestamp",
+        ),
+        (
+            vec![("took", Arc::new(DurationMillisecondArray::from(vec![1, 2])))],
+            "key `took`\n  expected a column without",
+        ),
+        (vec![("count", Arc::new(Float64Array::from(vec![1.0, 1.5])))], "row 2, key `count`\n  expected an integer of"),
+    ] {
+        let told = refused(columns);
+        assert!(told.contains("in.parquet") && told.contains(words), "{told}");
+    }
     let told = refused(vec![("reward", Arc::new(StringArray::from(vec!["1", "2"])))]);
     assert!(told.contains("row 1, key `reward`") && told.contains("found the text `1`"), "{told}");
     let told = refused(vec![("reward", Arc::new(Int64Array::from(vec![1, 9_007_199_254_740_993])))]);
@@ -152,12 +177,20 @@ fn values_that_do_not_fit_are_refused_by_row_and_column() {
 fn a_cell_of_csv_that_does_not_fit_is_named() {
     let folder = folder();
     let at = folder.path();
-    for cell in ["NA", "inf", "None", "1e999", "007"] {
+    let [declared, exact] = ["a number, as the definitions", "a number that 64-bit floats hold exactly"];
+    for (cell, expected, found) in [
+        ("NA", declared, "the text `NA`"),
+        ("null", declared, "the text `null`"),
+        ("007", declared, "the text `007`"),
+        ("1e999", exact, "1e999"),
+        ("9007199254740993.01", exact, "9007199254740993.01"),
+        ("100000000000000000000000000001", exact, "100000000000000000000000000001"),
+    ] {
         let text = format!("episode_id,model,experiment,seed,run,t,reward\ne,m,x,1,1,1,0.1\ne,m,x,1,1,2,{cell}\n");
         fs::write(at.join("rows.csv"), text).unwrap();
         let told = run(at, &[&["import", "rows.csv"], &WITH[..]].concat()).refused();
-        let words = "rows.csv, row 2, key `reward`\n  expected a number";
-        assert!(told.contains(words) && told.contains(&format!("found the text `{cell}`")), "{told}");
+        let words = format!("rows.csv, row 2, key `reward`\n  expected {expected}");
+        assert!(told.contains(&words) && told.contains(&format!("found {found}\n")), "{told}");
     }
     let text = "episode_id,model,experiment,seed,run,t,n,id\ne,m,x,1,1,1,9007199254740993,12345678901234567890\n";
     fs::write(at.join("rows.csv"), text).unwrap();
@@ -169,6 +202,40 @@ fn a_cell_of_csv_that_does_not_fit_is_named() {
     fs::write(at.join("rows.csv"), text.replace("12345678901234567890\n", "x\ne,m,x,1,1,2,0.5,y\n")).unwrap();
     let told = run(at, &[&["import", "rows.csv"], &WITH[..]].concat()).refused();
     assert!(told.contains("row 1, key `n`") && told.contains("found 9007199254740993"), "{told}");
+}
+
+#[test]
+fn cells_that_stand_for_no_number_are_floats_texts_or_refused() {
+    let folder = folder();
+    let at = folder.path();
+    let table = |reward: [&str; 2], own: [&str; 2]| {
+        let line = |t: usize| format!("e,m,x,1,1,{t},{},{}\n", reward[t - 1], own[t - 1]);
+        let text = format!("episode_id,model,experiment,seed,run,t,reward,own\n{}{}", line(1), line(2));
+        fs::write(at.join("rows.csv"), text).unwrap();
+        run(at, &[&["import", "rows.csv"], &WITH[..]].concat())
+    };
+    let column = |name: &str| {
+        let found = rows(&at.join("x.parquet"));
+        let text = |row| arrow::util::display::array_value_to_string(found.column_by_name(name).unwrap(), row).unwrap();
+        [text(0), text(1)]
+    };
+    table(["nan", "-Infinity"], ["inf", "0.5"]).done();
+    assert_eq!((column("reward"), column("own")), (["NaN", "-inf"].map(Into::into), ["inf", "0.5"].map(Into::into)));
+    for texts in [["NA", ""], ["NA", "x"], ["x", "9007199254740993.01"], ["None", "null"]] {
+        table(["", "1"], texts).done();
+        assert_eq!(column("own"), texts.map(String::from));
+    }
+    for (own, row, expected) in [
+        (["NA", "1"], 1, "a number, as in other rows"),
+        (["1.5", "null"], 2, "a number, as in other rows"),
+        (["9007199254740993.01", "0.5"], 1, "a number, as in other rows"),
+        (["true", "N/A"], 2, "true or false, as in other rows"),
+    ] {
+        let told = table(["", ""], own).refused();
+        let found = own[row - 1];
+        assert!(told.contains(&format!("rows.csv, row {row}, key `own`\n  expected {expected}")), "{told}");
+        assert!(told.contains(&format!("found the text `{found}`\n")), "{told}");
+    }
 }
 
 #[test]
@@ -250,6 +317,22 @@ fn folders_may_have_columns() {
     );
     let told = run(at, &[&["import", name], &WITH[..]].concat()).refused();
     assert!(told.contains("row 2, key `model`") && told.contains("found the text `bee`"), "{told}");
+    let csv = "episode_id,experiment,seed,t\ne,x,1,1\n";
+    for (name, words) in [
+        ("model=a/run=1/reward=nan", "imported 1 episode"),
+        ("model=%FF/run=1/reward=__HIVE_DEFAULT_PARTITION__", "imported 1 episode"),
+        (
+            "model=__HIVE_DEFAULT_PARTITION__/run=1",
+            "key `model`\n  expected a text that is not empty\n  found null\n  help: the folder \
+             `model=__HIVE_DEFAULT_PARTITION__` says null",
+        ),
+    ] {
+        fs::create_dir_all(at.join(name)).unwrap();
+        let file = format!("{name}/rows.csv");
+        fs::write(at.join(&file), csv).unwrap();
+        let answer = run(at, &[&["import", &file], &WITH[..]].concat());
+        assert!(format!("{}{}", answer.stdout, answer.stderr).contains(words), "{}", answer.stderr);
+    }
     fs::write(at.join("open.toml"), "domain = \"arms\"\n[metric.N]\nvalue = \"length()\"\n").unwrap();
     let told = run(at, &["score", "runs", "--definitions", "open.toml"]).refused();
     assert!(told.contains("expected `act`, as in the name of the folder\n  found `bee`"), "{told}");
@@ -368,6 +451,28 @@ fn small_tables_of_many_values_are_refused() {
     write_rows(&at.join("list.parquet"), &[frames], None);
     let told = run(at, &[&["import", "list.parquet", "--from", "lerobot"], &WITH[..]].concat()).refused();
     assert!(told.contains("bytes inflated from a file of its size"), "{told}");
+}
+
+#[test]
+fn values_that_change_in_an_episode_are_named_by_their_line() {
+    let folder = folder();
+    let at = folder.path();
+    let task = "[column.task]\ntype = \"float\"\nconstant = true\n";
+    fs::write(at.join("arms.toml"), format!("{DEFINITIONS}{task}")).unwrap();
+    let import = |second: &str| {
+        let head = r#"{"episode_id":"e","model":"m","experiment":"x","seed":1,"run":1"#;
+        fs::write(at.join("s.jsonl"), format!("{head},\"t\":1,\"task\":1}}\n{head},\"t\":2,\"task\":{second}}}\n"))
+            .unwrap();
+        run(at, &[&["import", "s.jsonl"], &WITH[..]].concat())
+    };
+    import("1.0").done();
+    for second in ["2", "null"] {
+        let told = import(second).refused();
+        let words = format!(
+            "s.jsonl, line 2, key `task`\n  expected 1, as in the episode's first line (s.jsonl, line 1)\n  found {second}\n"
+        );
+        assert!(told.contains(&words), "{told}");
+    }
 }
 
 #[test]

@@ -36,13 +36,16 @@ struct Inferred {
     /// True if a value has a type of its own, which cells of CSV must fit.
     is_typed: bool,
     wide: Option<(Place, i64)>,
+    /// The first cell that stands for no value, or is a number that floats do not hold: a text only among texts.
+    odd: Option<(Place, String)>,
 }
 
 /// More than the own columns of any harness, but far fewer than keys that are data.
 const MOST_OWN: usize = 1000;
 /// 64-bit floats represent every integer up to this one.
 const EXACT: u64 = 1 << 53;
-const ABSENT: &str = "leave the cell empty, or write null, where there is no value; write infinities as Parquet";
+const ABSENT: &str = "leave the cell empty where there is no value, or write null in JSON";
+const UNHELD: &str = "write it as text in every line, or with fewer digits";
 /// The attribution, and the text from which it is read if a step has no key for it.
 pub(super) const ATTRIBUTION: &str = "self_color";
 pub(super) const TEXT: &str = "identification";
@@ -88,6 +91,7 @@ impl Columns {
             let Some(kind) = known.or_else(|| Some(declared(key)?.kind)) else { continue };
             match value {
                 LineValue::Cell(text) => *value = cell::typed(text, kind),
+                LineValue::Unheld(text) if kind == Kind::Float => *value = cell::typed(text, kind),
                 LineValue::Float(number) if kind == Kind::Int => {
                     *value = line::whole(*number).map_or(LineValue::Float(*number), LineValue::Int);
                 }
@@ -100,8 +104,8 @@ impl Columns {
     /// The values with the types that all cells of their columns gave them.
     pub(super) fn with_cells(&self, mut members: Members) -> Members {
         for (key, value) in &mut members {
-            if let (LineValue::Cell(text), Some(Inferred { kind: Some(kind), .. })) = (&*value, self.own.get(key)) {
-                *value = cell::typed(text, *kind);
+            if let (LineValue::Cell(text), Some(kind)) = (&*value, self.own.get(key).and_then(Inferred::kind)) {
+                *value = cell::typed(text, kind);
             }
         }
         members
@@ -131,13 +135,20 @@ impl Columns {
     }
 
     pub(super) fn faults(&self) -> Vec<Fault> {
+        let odd = |(name, inferred): (&String, &Inferred)| {
+            let (place, cell) = inferred.odd.as_ref()?;
+            let kind = inferred.kind.filter(|kind| *kind != Kind::String)?;
+            let help = if cell::is_absent(cell) { ABSENT } else { UNHELD };
+            let found = LineValue::Cell(cell.clone()).shown();
+            Some(Fault::new(format!("{}, as in other rows", named(kind)), found, help).of_key(name).at(place))
+        };
         let lossy = |(name, inferred): (&String, &Inferred)| {
             let (place, value) = inferred.wide.as_ref().filter(|_| inferred.kind == Some(Kind::Float))?;
             let expected = format!("a number that is exact beside those with fractions, at most {EXACT}");
             let help = "write the large numbers as text in every line, or the fractions under another key";
             Some(Fault::new(expected, value.to_string(), help).of_key(name).at(place))
         };
-        self.own.iter().filter_map(lossy).collect()
+        self.own.iter().filter_map(odd).chain(self.own.iter().filter_map(lossy)).collect()
     }
 
     pub(super) fn known(&self) -> impl Iterator<Item = &'static Column> + '_ {
@@ -145,7 +156,7 @@ impl Columns {
     }
 
     pub(super) fn own(&self) -> Vec<Own> {
-        self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind }).collect()
+        self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind() }).collect()
     }
 
     fn check_own(&mut self, key: &str, value: &LineValue, place: &Place) -> Option<Fault> {
@@ -166,9 +177,19 @@ impl Columns {
 }
 
 impl Inferred {
+    fn kind(&self) -> Option<Kind> {
+        self.kind.or(self.odd.as_ref().map(|_| Kind::String))
+    }
+
     /// Adds a value; returns a fault if its type does not fit those before it.
     fn take(&mut self, kind: Option<Kind>, value: &LineValue, place: &Place) -> Option<Fault> {
         let now = kind?;
+        if let LineValue::Cell(cell) = value
+            && cell::is_odd(cell)
+        {
+            self.odd.get_or_insert_with(|| (place.clone(), cell.clone()));
+            return None;
+        }
         let is_cell = matches!(value, LineValue::Cell(_));
         if let Some(value) = integer(value).filter(|value| value.unsigned_abs() > EXACT && self.wide.is_none()) {
             self.wide = Some((place.clone(), value));
@@ -233,9 +254,9 @@ fn kind_of(value: &LineValue) -> Result<Option<Kind>, Box<Fault>> {
         LineValue::Float(_) => Ok(Some(Kind::Float)),
         LineValue::Text(_) => Ok(Some(Kind::String)),
         LineValue::Cell(text) => Ok(Some(cell::kind_of(text))),
-        LineValue::LargeInt(_) => {
-            let expected = format!("an integer of at most {}", i64::MAX);
-            Err(Box::new(Fault::new(expected, value.shown(), "write it as text in every line")))
+        LineValue::Unheld(_) => {
+            let expected = format!("an integer of at most {}, or a number that 64-bit floats hold", i64::MAX);
+            Err(Box::new(Fault::new(expected, value.shown(), UNHELD)))
         }
         LineValue::List | LineValue::Object(_) => {
             let help = "give its parts keys of their own, write it as text, or leave it out";
@@ -257,13 +278,12 @@ fn misfit(column: &Column, value: &LineValue, limits: Limits<'_>) -> Option<Faul
             None
         }
         (Kind::Int, LineValue::Float(value)) if value.fract() != 0.0 => refused("write a whole number"),
-        (Kind::Int, LineValue::Int(_) | LineValue::LargeInt(_) | LineValue::Float(_)) => {
+        (Kind::Int, LineValue::Int(_) | LineValue::Unheld(_) | LineValue::Float(_)) => {
             refused("correct the number, or use smaller ones")
         }
         (Kind::Float, _) if is_held(column, value) => None,
-        (Kind::Float, LineValue::Int(_) | LineValue::LargeInt(_) | LineValue::Float(_)) => {
-            refused("correct the number")
-        }
+        (Kind::Float, LineValue::Unheld(_)) => refused("64-bit floats do not hold it: write fewer digits"),
+        (Kind::Float, LineValue::Int(_) | LineValue::Float(_)) => refused("correct the number"),
         (Kind::String, LineValue::Text(text)) => {
             let Limits { expected, palette, .. } = limits;
             let rules = rules_of(column, Known { palette, experiments: expected.experiments });
@@ -281,20 +301,20 @@ fn misdeclared(key: &str, value: &LineValue, limits: Limits<'_>) -> Option<Fault
         (_, LineValue::Null)
             | (Kind::Bool, LineValue::Bool(_))
             | (Kind::Int, LineValue::Int(_))
-            | (Kind::Float, LineValue::Float(_))
+            | (Kind::Float, LineValue::Int(_) | LineValue::Float(_))
             | (Kind::String, LineValue::Text(_))
     );
     let help = "correct the value, or declare the column as the lines have it, under `[column.NAME]`";
-    if let (Kind::Float, LineValue::Int(number)) = (declared.kind, value) {
-        let expected = || format!("a number that 64-bit floats hold exactly, as the integers up to {EXACT}");
-        return (!is_exact(*number)).then(|| Fault::new(expected(), value.shown(), help));
-    }
-    if !is_of_kind && is_absent(value) {
-        let expected = format!("{}, as the definitions declare it, or null", named(declared.kind));
-        return Some(Fault::new(expected, value.shown(), ABSENT));
+    let is_held =
+        !matches!(value, LineValue::Unheld(_)) && !matches!(value, LineValue::Int(number) if !is_exact(*number));
+    if declared.kind == Kind::Float && !is_held {
+        let expected = format!("a number that 64-bit floats hold exactly, as the integers up to {EXACT}");
+        return Some(Fault::new(expected, value.shown(), help));
     }
     if !is_of_kind {
-        let expected = format!("{}, as the definitions declare it", named(declared.kind));
+        let what = if declared.kind == Kind::Int { "an integer of 64 bits" } else { named(declared.kind) };
+        let (or_null, help) = if is_absent(value) { (", or null", ABSENT) } else { ("", help) };
+        let expected = format!("{what}, as the definitions declare it{or_null}");
         return Some(Fault::new(expected, value.shown(), help));
     }
     let LineValue::Text(text) = value else { return None };
@@ -305,10 +325,8 @@ fn misdeclared(key: &str, value: &LineValue, limits: Limits<'_>) -> Option<Fault
     (!is_known).then(|| Fault::new(expected(), value.shown(), near().unwrap_or_else(|| help.to_owned())))
 }
 
-/// Spellings of missing values in CSV of R, pandas and spreadsheets.
 fn is_absent(value: &LineValue) -> bool {
-    let LineValue::Text(text) = value else { return false };
-    ["NA", "N/A", "#N/A", "None", "null", "NULL", "inf", "-inf", "Inf", "-Inf"].contains(&text.as_str())
+    matches!(value, LineValue::Text(text) if cell::is_absent(text))
 }
 
 /// Returns true if the integer is the same as a float.

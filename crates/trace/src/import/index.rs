@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::error::{Fault, Place};
 use super::line::{LineValue, Members};
 use super::text::{Line, Text};
-use crate::schema::{COLUMNS, Column};
+use crate::schema::{COLUMNS, DeclaredColumn};
 use exact::escape::visible;
 
 #[derive(Clone, Copy, Debug)]
@@ -25,15 +25,12 @@ struct Head {
     constants: Vec<LineValue>,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Index {
+    constants: Vec<String>,
     heads: Vec<Head>,
     by_id: HashMap<String, usize>,
     steps: Vec<IndexedStep>,
-}
-
-fn constants() -> impl Iterator<Item = &'static Column> {
-    COLUMNS.iter().filter(|column| column.constant && column.name != "episode_id")
 }
 
 fn value<'a>(members: &'a Members, name: &str) -> &'a LineValue {
@@ -41,6 +38,14 @@ fn value<'a>(members: &'a Members, name: &str) -> &'a LineValue {
 }
 
 impl Index {
+    /// An index that compares the constant columns of the schema and of the definitions.
+    pub(super) fn new(declared: &[DeclaredColumn]) -> Self {
+        let known = COLUMNS.iter().filter(|column| column.constant && column.name != "episode_id");
+        let declared = declared.iter().filter(|column| column.constant).map(|column| column.name.as_str());
+        let constants = known.map(|column| column.name).chain(declared).map(str::to_owned).collect();
+        Self { constants, heads: Vec::new(), by_id: HashMap::new(), steps: Vec::new() }
+    }
+
     pub(super) fn add(&mut self, text: usize, line: &Line, members: &Members) -> Option<Fault> {
         let (LineValue::Text(id), LineValue::Int(t)) = (value(members, "episode_id"), value(members, "t")) else {
             return None;
@@ -49,20 +54,20 @@ impl Index {
         let episode = known.unwrap_or_else(|| self.begin(id, line, members));
         self.steps.push(IndexedStep { episode, t: *t, text, offset: line.offset, line: line.place.line });
         let head = &self.heads[episode];
-        let mut pairs = constants().zip(&head.constants);
+        let mut pairs = self.constants.iter().zip(&head.constants);
         pairs.find_map(|(column, first)| {
-            let now = value(members, column.name);
-            if now == first {
+            let now = value(members, column);
+            if now.is_same(first) {
                 return None;
             }
             let expected = format!("{}, as in the episode's first line ({})", first.shown(), head.place);
             let help = "correct the lines, or give the episodes ids of their own";
-            Some(Fault::new(expected, now.shown(), help).of_key(column.name).at(&line.place))
+            Some(Fault::new(expected, now.shown(), help).of_key(column).at(&line.place))
         })
     }
 
     fn begin(&mut self, id: &str, line: &Line, members: &Members) -> usize {
-        let constants = constants().map(|column| value(members, column.name).clone()).collect();
+        let constants = self.constants.iter().map(|column| value(members, column).clone()).collect();
         self.heads.push(Head { id: id.to_owned(), place: line.place.clone(), constants });
         self.by_id.insert(id.to_owned(), self.heads.len() - 1);
         self.heads.len() - 1

@@ -9,7 +9,9 @@ use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess,
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::cell;
 use super::error::Fault;
+use super::format::json::{UNHELD, marked};
 use exact::escape::{exact, visible};
 
 pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
@@ -20,8 +22,8 @@ pub enum LineValue {
     Null,
     Bool(bool),
     Int(i64),
-    /// An integer that does not fit into a column of integers.
-    LargeInt(u64),
+    /// The spelling of a number that neither 64-bit integers nor floats hold, and of integers that only floats hold.
+    Unheld(String),
     Float(f64),
     Text(String),
     /// A cell of CSV, whose type follows from its column.
@@ -34,17 +36,33 @@ pub enum LineValue {
 pub(super) type Members = Vec<(String, LineValue)>;
 
 impl LineValue {
+    /// Returns true if a column stores both as one value: `1` and `1.0`, or NaN twice.
+    #[expect(clippy::cast_precision_loss, reason = "columns of floats take only integers that they hold")]
+    pub(super) fn is_same(&self, other: &Self) -> bool {
+        let float = |value: &Self| match value {
+            Self::Int(number) => Some(*number as f64),
+            Self::Float(number) => Some(*number),
+            _ => None,
+        };
+        match (self, other) {
+            (Self::Float(_), _) | (_, Self::Float(_)) => {
+                float(self).zip(float(other)).is_some_and(|(one, two)| one.to_bits() == two.to_bits())
+            }
+            _ => self == other,
+        }
+    }
+
     pub(super) fn shown(&self) -> String {
         const LONGEST: usize = 60;
         match self {
             Self::Null => "null".into(),
             Self::Bool(value) => value.to_string(),
             Self::Int(value) => value.to_string(),
-            Self::LargeInt(value) => value.to_string(),
             Self::Float(value) => format!("{value:?}"),
             Self::Text(text) | Self::Cell(text) if text.chars().count() > LONGEST => {
                 format!("the text `{}...`", visible(&text.chars().take(LONGEST).collect::<String>()))
             }
+            Self::Unheld(number) => number.chars().take(LONGEST).collect(),
             Self::Text(text) | Self::Cell(text) => format!("the text `{}`", exact(text)),
             Self::List => "a list".into(),
             Self::Object(_) => "an object".into(),
@@ -58,12 +76,17 @@ pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> 
         let found = format!("other bytes after the first {}", error.valid_up_to());
         Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
     })?;
-    let mut json = serde_json::Deserializer::from_str(text.trim_end());
+    let marked = marked(text.trim_end());
+    let mut json = serde_json::Deserializer::from_str(&marked);
     match (Plain { is_line: true }).deserialize(&mut json).and_then(|value| json.end().map(|()| value)) {
         Ok(LineValue::Object(members)) => Ok(unique(members)?),
         Ok(other) => Err(Box::new(Fault::new("a JSON object, one step", other.shown(), "write one object a line"))),
         Err(error) => Err(Box::new(no_json(text.trim_end(), ended, &error))),
     }
+}
+
+fn of_text(text: &str) -> LineValue {
+    text.strip_prefix(UNHELD).map_or_else(|| LineValue::Text(text.to_owned()), cell::number)
 }
 
 /// The integer that a number with a point equals, as in `2.0`.
@@ -93,10 +116,10 @@ pub(super) fn of_json(value: &Value) -> LineValue {
         Value::Bool(value) => LineValue::Bool(*value),
         Value::Number(number) => match (number.as_i64(), number.as_u64()) {
             (Some(value), _) => LineValue::Int(value),
-            (None, Some(value)) => LineValue::LargeInt(value),
+            (None, Some(value)) => LineValue::Unheld(value.to_string()),
             (None, None) => LineValue::Float(number.as_f64().unwrap_or(f64::NAN)),
         },
-        Value::String(text) => LineValue::Text(text.clone()),
+        Value::String(text) => of_text(text),
         Value::Array(_) => LineValue::List,
         Value::Object(_) => LineValue::Object(Members::new()),
     }
@@ -170,7 +193,7 @@ impl<'de> Visitor<'de> for Plain {
     }
 
     fn visit_u64<E>(self, value: u64) -> Result<LineValue, E> {
-        Ok(i64::try_from(value).map_or(LineValue::LargeInt(value), LineValue::Int))
+        Ok(i64::try_from(value).map_or_else(|_| LineValue::Unheld(value.to_string()), LineValue::Int))
     }
 
     fn visit_f64<E>(self, value: f64) -> Result<LineValue, E> {
@@ -178,7 +201,7 @@ impl<'de> Visitor<'de> for Plain {
     }
 
     fn visit_str<E>(self, text: &str) -> Result<LineValue, E> {
-        Ok(LineValue::Text(text.to_owned()))
+        Ok(of_text(text))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<LineValue, A::Error> {
@@ -208,8 +231,14 @@ mod tests {
         let line = r#"{"a":1,"b":1.0,"c":-9223372036854775808,"d":18446744073709551615,"e":1e3,"f":null}"#;
         let values: Vec<_> = members(line.as_bytes(), true).unwrap().into_iter().map(|(_, value)| value).collect();
         let (int, float) = (LineValue::Int, LineValue::Float);
-        let expected =
-            [int(1), float(1.0), int(i64::MIN), LineValue::LargeInt(u64::MAX), float(1000.0), LineValue::Null];
+        let expected = [
+            int(1),
+            float(1.0),
+            int(i64::MIN),
+            LineValue::Unheld(u64::MAX.to_string()),
+            float(1000.0),
+            LineValue::Null,
+        ];
         assert_eq!(values, expected);
     }
 

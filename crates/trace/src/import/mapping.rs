@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use arrow::array::{Array as _, ArrayRef, RecordBatch, new_null_array};
 use arrow::datatypes::DataType;
-use arrow::error::ArrowError;
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 
 use super::cell;
+use super::format::json::marked;
 use super::line::{self, LineValue};
-use super::table::RowValues;
+use super::table::{RowValues, Unreadable};
 use crate::schema::domain::is_general;
 use crate::schema::{Kind, column};
 use exact::escape::visible;
@@ -97,7 +97,13 @@ impl Mapping {
     }
 
     pub(super) fn count_dropped(&mut self, what: String) {
-        *self.dropped.entry(what).or_default() += 1;
+        self.count_all_dropped(what, 1);
+    }
+
+    pub(super) fn count_all_dropped(&mut self, what: String, count: u64) {
+        if count > 0 {
+            *self.dropped.entry(what).or_default() += count;
+        }
     }
 
     pub(super) fn reads(&self, keys: &str) -> bool {
@@ -130,8 +136,11 @@ impl Mapping {
         mapped.chain(others).chain(self.constants()).collect()
     }
 
-    /// The same for the columns of a table. Errors: a column of a type that has no text.
-    pub(super) fn columns<'m>(&'m self, table: &'m RecordBatch) -> Result<Vec<MappedColumn<'m>>, ArrowError> {
+    /// The same for the columns of a table. Errors: a column with a value that has no text.
+    pub(super) fn columns<'m>(
+        &'m self,
+        table: &'m RecordBatch,
+    ) -> Result<Vec<MappedColumn<'m>>, (&'m str, Unreadable)> {
         let mapped = self.columns.iter().map(|(name, path)| (name.as_str(), Some(path), path.column(table)));
         let schema = table.schema_ref().fields().iter().map(|field| field.name().as_str());
         let others = schema.zip(table.columns());
@@ -141,7 +150,8 @@ impl Mapping {
         let columns = mapped.chain(others).filter(|(name, ..)| is_free(name));
         let column = |(name, path, values): (&'m str, _, Option<ArrayRef>)| {
             let values = values.unwrap_or_else(|| new_null_array(&DataType::Null, table.num_rows()));
-            RowValues::new(&values).map(|values| MappedColumn { name, values, path })
+            let values = RowValues::new(&values).map_err(|unreadable| (name, unreadable))?;
+            Ok(MappedColumn { name, values, path })
         };
         columns.map(column).collect()
     }
@@ -162,8 +172,7 @@ impl Mapping {
 }
 
 impl MappedColumn<'_> {
-    /// The value of a row. Errors: text that is not UTF-8.
-    pub(super) fn at(&self, row: usize) -> Result<LineValue, usize> {
+    pub(super) fn at(&self, row: usize) -> Result<LineValue, Unreadable> {
         let value = self.values.at(row)?;
         Ok(match self.path {
             Some(path) => path.finished(self.name, value),
@@ -193,7 +202,8 @@ impl Path {
     /// The value with the number added. A number becomes text in columns that are text in every domain.
     fn finished(&self, name: &str, found: LineValue) -> LineValue {
         match self.added(found) {
-            number @ (LineValue::Int(_) | LineValue::LargeInt(_) | LineValue::Float(_)) if is_general_text(name) => {
+            LineValue::Unheld(number) if is_general_text(name) => LineValue::Text(number),
+            number @ (LineValue::Int(_) | LineValue::Float(_)) if is_general_text(name) => {
                 LineValue::Text(number.shown())
             }
             value => value,
@@ -260,7 +270,8 @@ fn pair(typed: &str, expected: &'static str) -> Result<(String, String), Mapping
 
 fn constant(name: String, text: String) -> (String, Value) {
     let is_text = column(&name).is_some_and(|column| column.stored.kind() == Kind::String);
-    let scalar =
-        serde_json::from_str(&text).ok().filter(|value: &Value| !(is_text || value.is_array() || value.is_object()));
+    let scalar = serde_json::from_str(&marked(&text))
+        .ok()
+        .filter(|value: &Value| !(is_text || value.is_array() || value.is_object()));
     (name, scalar.unwrap_or(Value::String(text)))
 }

@@ -105,7 +105,7 @@ pub struct Imported {
 /// Writes the steps of these texts, checked against `limits`, to the trace at `out`.
 pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Imported, ImportError> {
     let mut columns = Columns::default();
-    let mut index = Index::default();
+    let mut index = Index::new(limits.expected.declared);
     let mut faults = Faults::default();
     for (at, text) in texts.iter_mut().enumerate() {
         survey(at, text, limits, &mut columns, &mut index, &mut faults)?;
@@ -151,7 +151,7 @@ fn survey(
         if found.is_empty() {
             faults.extend(index.add(at, &line, &members));
         }
-        faults.extend(found);
+        faults.extend(found.into_iter().map(|fault| text.of_folder(fault)));
     }
     if is_empty {
         faults.add(Fault {
@@ -219,7 +219,6 @@ fn plain<'a>(value: Option<&'a line::LineValue>, stored: &DataType) -> Result<Op
         Some(line::LineValue::Bool(value)) => Value::Bool(*value),
         Some(line::LineValue::Int(value)) if stored.is_floating() => Value::Float(*value as f64),
         Some(line::LineValue::Int(value)) => Value::Int(*value),
-        Some(line::LineValue::LargeInt(value)) if stored.is_floating() => Value::Float(*value as f64),
         Some(line::LineValue::Float(value)) => Value::Float(*value),
         Some(line::LineValue::Text(text)) => Value::Text(text),
         Some(_) => return Err(()),

@@ -1,6 +1,7 @@
 //! Columns of tables as the values of rows, unchanged: numbers keep their value, infinities and NaN included.
 //!
-//! What is neither a number nor a truth value becomes text, such as `2026-01-01T00:00:00Z` of a time in any zone.
+//! What is neither a number nor a truth value becomes text, such as `2026-01-01T00:00:00Z` of a time in any zone. Bytes
+//! are text in UTF-8, as writers without the annotation leave it.
 
 use std::sync::Arc;
 
@@ -10,6 +11,7 @@ use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type, UInt64Type};
 use arrow::error::ArrowError;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
 
+use super::cell;
 use super::line::LineValue;
 use super::mapping::Node;
 
@@ -21,28 +23,48 @@ pub(super) struct RowValues {
     are_cells: bool,
 }
 
+/// A value that a row cannot have; rows count from 0.
+#[derive(Debug)]
+pub(super) struct Unreadable {
+    pub(super) row: usize,
+    pub(super) expected: String,
+    pub(super) found: String,
+}
+
 impl RowValues {
-    pub(super) fn new(column: &ArrayRef) -> Result<Self, ArrowError> {
+    /// Errors: the first row whose value has no text.
+    pub(super) fn new(column: &ArrayRef) -> Result<Self, Unreadable> {
         let are_cells = column.data_type().is_decimal();
         plain(column).map(|values| Self { values, are_cells })
     }
 
-    /// The value of a row. Errors: text that is not UTF-8, with its length up to there.
-    pub(super) fn at(&self, row: usize) -> Result<LineValue, usize> {
-        Ok(match value(self.values.as_ref(), row)? {
-            LineValue::Text(text) if self.are_cells => LineValue::Cell(text),
+    pub(super) fn at(&self, row: usize) -> Result<LineValue, Unreadable> {
+        let not_text = |valid| Unreadable {
+            row,
+            expected: "text in UTF-8".into(),
+            found: format!("other bytes after the first {valid}"),
+        };
+        Ok(match value(self.values.as_ref(), row).map_err(not_text)? {
+            LineValue::Text(text) if self.are_cells => match cell::number(&text) {
+                unheld @ LineValue::Unheld(_) => unheld,
+                _ => LineValue::Cell(text),
+            },
             value => value,
         })
     }
 }
 
-fn plain(column: &ArrayRef) -> Result<ArrayRef, ArrowError> {
+fn plain(column: &ArrayRef) -> Result<ArrayRef, Unreadable> {
+    let cast = |column: &ArrayRef, to: &DataType| cast(column, to).map_err(|error| unreadable(column, 0, &error));
     match column.data_type() {
         DataType::UInt64 => Ok(Arc::clone(column)),
         integer if integer.is_integer() => cast(column, &DataType::Int64),
         float if float.is_floating() => cast(column, &DataType::Float64),
         DataType::LargeUtf8 | DataType::Utf8View => cast(column, &DataType::Utf8),
-        DataType::Null | DataType::Boolean | DataType::Utf8 | DataType::Dictionary(..) => Ok(Arc::clone(column)),
+        DataType::LargeBinary | DataType::BinaryView | DataType::FixedSizeBinary(_) => cast(column, &DataType::Binary),
+        DataType::Null | DataType::Boolean | DataType::Utf8 | DataType::Binary | DataType::Dictionary(..) => {
+            Ok(Arc::clone(column))
+        }
         nested if nested.is_nested() => Ok(Arc::clone(column)),
         // The same instant: names of zones need a table of zones.
         DataType::Timestamp(unit, Some(zone)) if **zone != *"+00:00" => {
@@ -52,11 +74,19 @@ fn plain(column: &ArrayRef) -> Result<ArrayRef, ArrowError> {
     }
 }
 
-fn texts(column: &ArrayRef) -> Result<ArrayRef, ArrowError> {
+fn texts(column: &ArrayRef) -> Result<ArrayRef, Unreadable> {
     let options = FormatOptions::default().with_display_error(false);
-    let shown = ArrayFormatter::try_new(column, &options)?;
-    let text = |row| column.is_valid(row).then(|| shown.value(row).try_to_string()).transpose();
+    let shown = ArrayFormatter::try_new(column, &options).map_err(|error| unreadable(column, 0, &error))?;
+    let text = |row| {
+        let text = column.is_valid(row).then(|| shown.value(row).try_to_string()).transpose();
+        text.map_err(|error| unreadable(column, row, &error))
+    };
     Ok(Arc::new((0..column.len()).map(text).collect::<Result<StringArray, _>>()?))
+}
+
+fn unreadable(column: &ArrayRef, row: usize, error: &ArrowError) -> Unreadable {
+    let expected = format!("a value of the type {} that has a text", column.data_type());
+    Unreadable { row, expected, found: error.to_string() }
 }
 
 fn value(values: &dyn Array, row: usize) -> Result<LineValue, usize> {
@@ -69,10 +99,11 @@ fn value(values: &dyn Array, row: usize) -> Result<LineValue, usize> {
         DataType::Int64 => LineValue::Int(values.as_primitive::<Int64Type>().value(row)),
         DataType::UInt64 => {
             let number = values.as_primitive::<UInt64Type>().value(row);
-            i64::try_from(number).map_or(LineValue::LargeInt(number), LineValue::Int)
+            i64::try_from(number).map_or_else(|_| LineValue::Unheld(number.to_string()), LineValue::Int)
         }
         DataType::Float64 => LineValue::Float(values.as_primitive::<Float64Type>().value(row)),
         DataType::Utf8 => LineValue::Text(text(values.as_string(), row)?),
+        DataType::Binary => LineValue::Text(utf8(values.as_binary::<i32>().value(row))?),
         DataType::Dictionary(..) => {
             let keys = values.as_dictionary::<Int32Type>();
             let key = keys.key(row).filter(|key| *key < keys.values().len()).ok_or(0_usize)?;
@@ -87,8 +118,11 @@ fn value(values: &dyn Array, row: usize) -> Result<LineValue, usize> {
 fn text(texts: &StringArray, row: usize) -> Result<String, usize> {
     let ends = [texts.value_offsets()[row], texts.value_offsets()[row + 1]];
     let [start, end] = ends.map(|end| usize::try_from(end).unwrap_or_default());
-    let text = std::str::from_utf8(&texts.value_data()[start..end]).map_err(|error| error.valid_up_to())?;
-    Ok(text.to_owned())
+    utf8(&texts.value_data()[start..end])
+}
+
+fn utf8(bytes: &[u8]) -> Result<String, usize> {
+    std::str::from_utf8(bytes).map(str::to_owned).map_err(|error| error.valid_up_to())
 }
 
 /// A column inside a column of structs, lists or maps; null in rows without the part.

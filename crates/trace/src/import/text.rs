@@ -15,7 +15,7 @@ use super::format::lerobot::data_set;
 use super::format::{Format, HEAD, RowSink};
 use super::line::{self, BYTE_ORDER_MARK, LineValue, Members};
 use super::mapping::Mapping;
-use crate::inputs::{Input, folder_values};
+use crate::inputs::{Input, NULL_FOLDER, folder_values};
 use exact::budget::Limit;
 use exact::{hash, input};
 
@@ -156,6 +156,20 @@ impl Text {
         let rows = Self::of_file(&self.name, rows.finish()?);
         let noun = if are_lines { "line" } else { "row" };
         Ok(Self { noun, folders: self.folders, source: Some(source), ..rows })
+    }
+
+    /// The same fault, if the name of a folder says null, with that in its help.
+    pub(super) fn of_folder(&self, fault: Fault) -> Fault {
+        let is_null =
+            |(name, value): &(String, LineValue)| Some(name) == fault.key.as_ref() && *value == LineValue::Null;
+        if !self.folders.iter().any(is_null) {
+            return fault;
+        }
+        let help = format!(
+            "the folder `{}={NULL_FOLDER}` says null: rename it, or leave its files out",
+            fault.key.as_deref().unwrap_or_default()
+        );
+        Fault { help, ..fault }
     }
 
     fn begins_a_list(&mut self) -> Result<bool, ImportError> {

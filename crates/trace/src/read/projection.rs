@@ -87,6 +87,10 @@ fn kind_in(set: &TraceSet, name: &str) -> Result<Kind, TraceError> {
             "the same type in all files",
             format!("{} in {one} and {} in {other}; cast one of them", this.name(), that.name()),
         ),
-        None => refused("bool, integer, float or string", "another type; cast it where the file is written".into()),
+        None => refused(
+            "bool, integer, float or string",
+            "another type; cast it where the file is written, or make a trace of the file with `mirrorstats import`"
+                .into(),
+        ),
     }
 }

@@ -5,7 +5,7 @@ use std::fs::File;
 use serde_json::{Value, json};
 
 use super::RowSink;
-use super::json::WithoutNan;
+use super::json::PythonJson;
 use crate::import::error::ImportError;
 
 /// Lists with one item per trial of a scene, and the column of each.
@@ -20,7 +20,7 @@ const PER_TRIAL: [(&str, &str); 5] = [
 pub(super) fn read(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let help = "name a log of `inspect-robots`; another JSON file has another --from";
     let expected = "an EvalLog of inspect-robots, version 1";
-    let log: Value = serde_json::from_reader(WithoutNan::new(file))
+    let log: Value = serde_json::from_reader(PythonJson::new(file))
         .map_err(|error| rows.fault("", expected, error.to_string(), help))?;
     let (eval, scenes) = (&log["eval"], log["samples"].as_array());
     let Some(scenes) = scenes.filter(|_| log["version"] == 1 && eval["policy"].is_string()) else {

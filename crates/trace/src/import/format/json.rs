@@ -1,16 +1,42 @@
 //! JSON as Python writes it: `NaN` becomes null, its word for a missing number, and infinities become texts, which no
-//! column of numbers takes.
+//! column of numbers takes. Numbers that the parser would round become marked texts.
 
+use std::borrow::Cow;
 use std::io::{self, BufReader, Read};
 
 use memchr::memmem;
 use serde::de::DeserializeOwned;
 
+use crate::import::cell;
+use crate::import::line::LineValue;
+
+/// The mark before a number in a text. Unicode reserves this character for use inside of programs.
+pub(in crate::import) const UNHELD: char = '\u{fdd0}';
+
+/// JSON in which numbers that neither 64-bit integers nor floats hold are marked texts.
+pub(in crate::import) fn marked(json: &str) -> Cow<'_, str> {
+    if !may_round(json.as_bytes()) {
+        return Cow::Borrowed(json);
+    }
+    let mut text = String::with_capacity(json.len());
+    match PythonJson::numbers(json.as_bytes()).read_to_string(&mut text) {
+        Ok(_) => Cow::Owned(text),
+        Err(_) => Cow::Borrowed(json),
+    }
+}
+
+/// Returns true for many digits in a row, and for negative exponents: without them no number is rounded.
+fn may_round(json: &[u8]) -> bool {
+    let is_part = |byte: &u8| byte.is_ascii_digit() || *byte == b'.';
+    json.split(|byte| !is_part(byte)).any(|digits| digits.len() > 15)
+        || json.windows(2).any(|pair| matches!(pair, b"e-" | b"E-"))
+}
+
 pub(super) fn from_bytes<T: DeserializeOwned>(bytes: Vec<u8>) -> io::Result<T> {
     match serde_json::from_slice(&bytes) {
         Err(_) if [&b"NaN"[..], b"Infinity"].iter().any(|word| memmem::find(&bytes, word).is_some()) => {
             let mut strict = Vec::with_capacity(bytes.len());
-            WithoutNan::new(&bytes[..]).read_to_end(&mut strict)?;
+            PythonJson::new(&bytes[..]).read_to_end(&mut strict)?;
             drop(bytes);
             Ok(serde_json::from_slice(&strict)?)
         }
@@ -18,17 +44,25 @@ pub(super) fn from_bytes<T: DeserializeOwned>(bytes: Vec<u8>) -> io::Result<T> {
     }
 }
 
-/// Replaces `NaN` outside of texts by `null`, and puts `Infinity` and `-Infinity` in quotes.
-pub(super) struct WithoutNan<R> {
+/// Replaces `NaN` outside of texts by `null`, and puts `Infinity`, `-Infinity` and unheld numbers in quotes.
+pub(super) struct PythonJson<R> {
     bytes: io::Bytes<BufReader<R>>,
+    /// False to leave `NaN` and infinities, which the parser refuses.
+    takes_words: bool,
     pending: Vec<u8>,
     in_text: bool,
     escaped: bool,
 }
 
-impl<R: Read> WithoutNan<R> {
+impl<R: Read> PythonJson<R> {
     pub(super) fn new(reader: R) -> Self {
-        Self { bytes: BufReader::new(reader).bytes(), pending: Vec::new(), in_text: false, escaped: false }
+        Self { takes_words: true, ..Self::numbers(reader) }
+    }
+
+    /// Strict JSON, whose numbers alone are changed.
+    pub(super) fn numbers(reader: R) -> Self {
+        let bytes = BufReader::new(reader).bytes();
+        Self { bytes, takes_words: false, pending: Vec::new(), in_text: false, escaped: false }
     }
 
     fn next(&mut self) -> io::Result<Option<u8>> {
@@ -42,15 +76,37 @@ impl<R: Read> WithoutNan<R> {
             return Ok(Some(byte));
         }
         self.in_text = byte == b'"';
-        if !matches!(byte, b'N' | b'I' | b'-') {
-            return Ok(Some(byte));
+        match byte {
+            b'N' | b'I' if self.takes_words => self.word(vec![byte]),
+            b'-' | b'0'..=b'9' => self.number(byte),
+            _ => Ok(Some(byte)),
         }
-        self.word(byte)
+    }
+
+    fn number(&mut self, first: u8) -> io::Result<Option<u8>> {
+        let mut number = vec![first];
+        let after = loop {
+            match self.bytes.next().transpose()? {
+                Some(byte @ (b'0'..=b'9' | b'.' | b'e' | b'E' | b'+' | b'-')) => number.push(byte),
+                after => break after,
+            }
+        };
+        if after == Some(b'I') && number == b"-" && self.takes_words {
+            return self.word(b"-I".to_vec());
+        }
+        let spelling = String::from_utf8_lossy(&number);
+        // Every number with so few digits and no exponent is held.
+        let is_short = number.len() <= 15 && !number.contains(&b'e') && !number.contains(&b'E');
+        if !is_short && is_json(&number) && matches!(cell::number(&spelling), LineValue::Unheld(_)) {
+            number = format!("\"{UNHELD}{spelling}\"").into_bytes();
+        }
+        self.in_text = after == Some(b'"');
+        self.pending = number.into_iter().chain(after).rev().collect();
+        Ok(self.pending.pop())
     }
 
     /// The first byte of what replaces the word, or of the text if it is not one of the words.
-    fn word(&mut self, first: u8) -> io::Result<Option<u8>> {
-        let mut word = vec![first];
+    fn word(&mut self, mut word: Vec<u8>) -> io::Result<Option<u8>> {
         while ["NaN", "Infinity", "-Infinity"].iter().any(|whole| whole.as_bytes().starts_with(&word)) {
             if ["NaN", "Infinity", "-Infinity"].iter().any(|whole| whole.as_bytes() == word) {
                 word = if word == b"NaN" { b"null".to_vec() } else { [b"\"", &word[..], b"\""].concat() };
@@ -67,7 +123,12 @@ impl<R: Read> WithoutNan<R> {
     }
 }
 
-impl<R: Read> Read for WithoutNan<R> {
+/// Returns true for a number of JSON; the parser refuses other spellings.
+fn is_json(number: &[u8]) -> bool {
+    serde_json::from_slice::<serde::de::IgnoredAny>(number).is_ok()
+}
+
+impl<R: Read> Read for PythonJson<R> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         for (at, slot) in out.iter_mut().enumerate() {
             match self.next()? {

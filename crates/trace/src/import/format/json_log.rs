@@ -11,10 +11,10 @@ use super::inspect::Log;
 use crate::import::error::ImportError;
 
 pub(super) fn read(json: impl Read, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
-    let mut log = JsonLog { log: None, rows, failed: None };
+    let mut log = JsonLog { log: None, status: Value::Null, rows, failed: None };
     let mut json = serde_json::Deserializer::from_reader(json);
     let read = (&mut log).deserialize(&mut json).and_then(|()| json.end());
-    let JsonLog { rows, failed, .. } = log;
+    let JsonLog { log, status, rows, failed } = log;
     match (failed, read) {
         (Some(error), _) => Err(error),
         (None, Err(error)) if error.is_io() => Err(ImportError::read(&rows.file)(error.into())),
@@ -22,13 +22,19 @@ pub(super) fn read(json: impl Read, rows: &mut RowSink<'_>) -> Result<(), Import
             let help = "copy the log again, or export it with `inspect log convert --to eval`";
             Err(rows.fault("", "a log of Inspect, an object with `eval` and `samples`", error.to_string(), help))
         }
-        (None, Ok(())) => Ok(()),
+        (None, Ok(())) => {
+            if let Some(log) = log {
+                log.finish(&status, rows);
+            }
+            Ok(())
+        }
     }
 }
 
 /// Visits the object of the log, or the list of its samples once `eval` was read.
 struct JsonLog<'r, 'm> {
     log: Option<Log>,
+    status: Value,
     rows: &'r mut RowSink<'m>,
     failed: Option<ImportError>,
 }
@@ -56,6 +62,7 @@ impl<'de> Visitor<'de> for &mut JsonLog<'_, '_> {
         while let Some(key) = map.next_key::<String>()? {
             match (key.as_str(), &self.log) {
                 ("eval", _) => self.log = Some(Log::new(map.next_value()?)),
+                ("status", _) => self.status = map.next_value()?,
                 ("samples", Some(_)) => map.next_value_seed(&mut *self)?,
                 ("samples", None) => return Err(A::Error::custom("`samples` before `eval`")),
                 _ => drop(map.next_value::<IgnoredAny>()?),

@@ -5,7 +5,7 @@
 mod csv;
 mod inspect;
 mod inspect_robots;
-mod json;
+pub(super) mod json;
 mod json_list;
 mod json_log;
 pub(super) mod lerobot;
@@ -20,11 +20,11 @@ use serde_json::{Map, Value};
 use super::error::{Fault, ImportError};
 use super::line::{self, BYTE_ORDER_MARK, LineValue};
 use super::mapping::{MappedColumn, Mapping, Row};
+use super::table::Unreadable;
 use super::text::{LONGEST_LINE, Line};
 use crate::read::budget::most_stored;
 use exact::budget::{Budget, Exceeded, Limit};
-use exact::escape::visible;
-use json::WithoutNan;
+use json::PythonJson;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
@@ -100,7 +100,7 @@ impl Format {
             Self::Inspect if inspect::is_archive(&mut file).map_err(ImportError::read(&rows.file))? => {
                 inspect::read_archive(file, rows)
             }
-            Self::Inspect => json_log::read(WithoutNan::new(file), rows),
+            Self::Inspect => json_log::read(PythonJson::new(file), rows),
             Self::InspectRobots => inspect_robots::read(file, rows),
             Self::LeRobot => lerobot::read(file, rows),
         }
@@ -148,17 +148,19 @@ impl<'m> RowSink<'m> {
                 self.mapping.leave_out(field.name(), (values.len() - values.null_count()) as u64);
             }
         }
-        let unreadable = |found: String| self.fault("", "columns of known types", found, "write the file anew");
-        let columns = self.mapping.columns(table).map_err(|error| unreadable(error.to_string()))?;
+        let refused = |(name, Unreadable { row, expected, found }): (&str, Unreadable)| {
+            let (file, line) = (self.file.clone(), Some(self.rows + row as u64 + 1));
+            let help = "correct the value, or leave the column out: `--set COLUMN=VALUE` replaces it";
+            let fault = Fault { file, line, noun: "row", ..Fault::new(expected, found, help) };
+            ImportError::from(fault.of_key(name))
+        };
+        let columns = self.mapping.columns(table).map_err(refused)?;
         let constants: Vec<_> = self.mapping.constants().collect();
         let mut rows = Vec::with_capacity(table.num_rows());
         for row in 0..table.num_rows() {
-            let value = |column: &MappedColumn<'_>| match column.at(row) {
-                Ok(value) => Ok((column.name.to_owned(), value)),
-                Err(valid) => {
-                    let found = format!("other bytes in column `{}` after the first {valid}", visible(column.name));
-                    Err(self.fault("", "text in UTF-8", found, "write the file anew"))
-                }
+            let value = |column: &MappedColumn<'_>| {
+                let value = column.at(row).map_err(|unreadable| refused((column.name, unreadable)))?;
+                Ok::<_, ImportError>((column.name.to_owned(), value))
             };
             let values = columns.iter().map(value).collect::<Result<Vec<_>, _>>()?;
             rows.push(line::to_record(&values.into_iter().chain(constants.iter().cloned()).collect()));

@@ -3,10 +3,14 @@
 use std::fs::File;
 use std::sync::Arc;
 
+use ::parquet::arrow::parquet_to_arrow_schema;
+use ::parquet::file::metadata::ParquetMetaData;
 use ::parquet::schema::types::Type;
 use arrow::array::RecordBatch;
+use arrow::datatypes::DataType;
 
 use super::RowSink;
+use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::import::error::{Fault, ImportError};
 use crate::read::budget::most_imported;
@@ -52,6 +56,12 @@ pub(super) fn each_batch_of(
         let finding = Finding::new(Code::RepeatedColumn, &rows.file, "one column of that name", "more than one");
         return Err(refused(rows, finding.in_column(twice.1.name())));
     }
+    let durations = durations(&metadata);
+    if let Some(root) = roots.iter().find(|root| durations.iter().any(|name| name == root.name())) {
+        let help = "cast it where the file is written, to an integer whose name says the unit, such as `latency_ms`";
+        let finding = Finding::new(Code::WrongType, &rows.file, "a column without a unit in its type", "durations");
+        return Err(refused(rows, finding.in_column(root.name()).with_help(help)));
+    }
     let wanted: Vec<_> = (0..roots.len()).filter(|at| choose(&roots[*at], count, rows)).collect();
     if let Err(exceeded) = most_imported(bytes).check(count.saturating_mul(wanted.len() as u64)) {
         return Err(refused(rows, Finding::over_budget(&rows.file, &exceeded)));
@@ -61,6 +71,15 @@ pub(super) fn each_batch_of(
         add(batch.map_err(|finding| refused(rows, *finding))?, rows)?;
     }
     Ok(())
+}
+
+/// The columns that Arrow's schema in the footer declares as durations: Parquet has only their integers.
+fn durations(metadata: &ParquetMetaData) -> Vec<String> {
+    let file = metadata.file_metadata();
+    let schema = contained(|| parquet_to_arrow_schema(file.schema_descr(), file.key_value_metadata()));
+    let fields = schema.ok().and_then(Result::ok).map(|schema| schema.fields().clone()).unwrap_or_default();
+    let durations = fields.iter().filter(|field| matches!(field.data_type(), DataType::Duration(_)));
+    durations.map(|field| field.name().clone()).collect()
 }
 
 fn refused(rows: &RowSink<'_>, finding: Finding) -> ImportError {

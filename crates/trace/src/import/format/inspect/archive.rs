@@ -58,6 +58,7 @@ pub(in super::super) fn read_archive(file: File, rows: &mut RowSink<'_>) -> Resu
         let sample = sample.map_err(|error| damaged(rows, name, &error))?;
         log.add(sample, name, rows)?;
     }
+    log.finish(&head["status"], rows);
     for _ in &strays {
         rows.mapping.count_dropped(format!("members that are no samples, the first `{}`", strays[0]));
     }

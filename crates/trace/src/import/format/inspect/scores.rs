@@ -3,17 +3,25 @@
 use serde_json::{Map, Value, json};
 
 use super::super::RowSink;
+use super::shape;
+use crate::import::error::ImportError;
 
 /// `score` of the first scorer, and a column for each. `later` are the scorers that the log lists after the first.
-pub(super) fn columns(scores: &Value, later: &[String], rows: &mut RowSink<'_>) -> Map<String, Value> {
+pub(super) fn columns(
+    scores: &Value,
+    later: &[String],
+    part: &str,
+    rows: &mut RowSink<'_>,
+) -> Result<Map<String, Value>, ImportError> {
     let mut columns = Map::new();
     columns.insert("score".to_owned(), Value::Null);
     let mut is_first = true;
     for (name, score) in scores.as_object().into_iter().flatten() {
         is_first &= !later.contains(name);
-        for (column, part) in parts(name, &score["value"]) {
-            let value = json!(number(part));
-            if value.is_null() && !part.is_null() {
+        shape(score, Value::is_object, "an object with `value` as each of the `scores`", part, rows)?;
+        for (column, found) in parts(name, &score["value"]) {
+            let value = json!(number(found));
+            if value.is_null() && !found.is_null() {
                 rows.mapping.count_dropped(format!("scores without a number, of `{name}`"));
             }
             if std::mem::take(&mut is_first) {
@@ -26,7 +34,7 @@ pub(super) fn columns(scores: &Value, later: &[String], rows: &mut RowSink<'_>) 
             }
         }
     }
-    columns
+    Ok(columns)
 }
 
 fn parts<'v>(name: &str, value: &'v Value) -> Vec<(String, &'v Value)> {

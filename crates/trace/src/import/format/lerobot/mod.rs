@@ -12,7 +12,7 @@ use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use indexmap::IndexMap;
 use serde_json::{Map, Value, json};
 
-use super::json::WithoutNan;
+use super::json::PythonJson;
 use super::{RowSink, parquet};
 use crate::import::error::ImportError;
 
@@ -32,7 +32,7 @@ pub(super) fn read(mut file: File, rows: &mut RowSink<'_>) -> Result<(), ImportE
 fn read_evaluation(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let help = "name the `eval_info.json` that `lerobot-eval` writes";
     let expected = "an evaluation of LeRobot, with `per_episode` or `per_task`";
-    let info: Value = serde_json::from_reader(WithoutNan::new(file))
+    let info: Value = serde_json::from_reader(PythonJson::new(file))
         .map_err(|error| rows.fault("", expected, error.to_string(), help))?;
     if let Some(episodes) = info["per_episode"].as_array() {
         return episodes.iter().try_for_each(|episode| add_episode(&episode["episode_ix"], "", episode, rows));

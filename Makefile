@@ -16,7 +16,7 @@ fmt:
 # Once as most people build it, and once with everything: Polars, and the world on MuJoCo's library.
 lint:
 	scripts/get-mujoco.sh
-	cargo clippy --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats-view \
+	cargo clippy --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats_view \
 		--all-targets -- -D warnings
 	cargo clippy --workspace --all-targets --all-features -- -D warnings
 

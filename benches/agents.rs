@@ -18,22 +18,22 @@ use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use mirrorstats_trace::episodes::episode::{Action, Step};
+use mirrorstats_world::agent::vlm::Vlm;
+use mirrorstats_world::agent::vlm::limits::Account;
+use mirrorstats_world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
+use mirrorstats_world::agent::vlm::provider::{Patience, Provider};
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_world::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
+use mirrorstats_world::record::lock::FolderLock;
+use mirrorstats_world::record::metadata;
+use mirrorstats_world::record::plan::{Key, Plan, Shard, Subject};
+use mirrorstats_world::record::run::{Progress, Recording, Settings};
+use mirrorstats_world::record::shares::{Shares, Spent};
+use mirrorstats_world::record::store::Store;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::config::WorldConfig;
 use tokio::runtime::Runtime;
-use trace::episode::{Action, Step};
-use world::agent::vlm::Vlm;
-use world::agent::vlm::limits::Account;
-use world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
-use world::agent::vlm::provider::{Patience, Provider};
-use world::agent::vlm::wire_format::Dialect;
-use world::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
-use world::record::lock::FolderLock;
-use world::record::metadata;
-use world::record::plan::{Key, Plan, Shard, Subject};
-use world::record::run::{Progress, Recording, Settings};
-use world::record::shares::{Shares, Spent};
-use world::record::store::Store;
-use world::sim::Experiment;
-use world::sim::config::WorldConfig;
 
 const IN_FLIGHT: usize = 64;
 const ANSWER_TAKES: Duration = Duration::from_secs(1);
@@ -53,7 +53,7 @@ impl Agent for AtOnce {
             self_color: None,
             selected_cube: None,
             mark_report: None,
-            answers: world::agent::Answers::new(),
+            answers: mirrorstats_world::agent::Answers::new(),
             words: Words::default(),
             raw: Some(REPLY.to_owned()),
             usage: Usage::default(),

@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use report::statistics::{Comparison, Statistics, Verdict};
-use statistics::competing::{Ending, Outcome};
-use statistics::holm::holm;
-use statistics::random::SplitMix64;
-use statistics::restricted::{independent, paired};
-use statistics::unpaired::fisher;
+use mirrorstats_report::statistics::{Comparison, Statistics, Verdict};
+use mirrorstats_statistics::comparisons::holm::holm;
+use mirrorstats_statistics::comparisons::unpaired::fisher;
+use mirrorstats_statistics::durations::competing::{Ending, Outcome};
+use mirrorstats_statistics::durations::restricted::{independent, paired};
+use mirrorstats_statistics::intervals::random::SplitMix64;
 
 const SEED: u64 = 20_260_131;
 const LEVEL: f64 = 0.05;

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use report::gate::{Gate, GateVerdict};
-use statistics::random::SplitMix64;
+use mirrorstats_report::gate::{Gate, GateVerdict};
+use mirrorstats_statistics::intervals::random::SplitMix64;
 
 const SEED: u64 = 20_261_124;
 const STUDIES: u64 = 150;

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::write_episodes;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 
 /// The number of pixels from which the recorder called the mirror visible.
 const RECORDED_THRESHOLD: i32 = 50;

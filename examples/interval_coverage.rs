@@ -4,15 +4,15 @@
 
 use std::fmt::Write as _;
 
-use exact::moments::Moments;
-use metric::catalog::StandardError::Sample;
-use statistics::bootstrap;
-use statistics::clustered::{clustered, clustered_rate};
-use statistics::competing::{Ending, Incidence, Outcome};
-use statistics::interval::{Interval, student_t};
-use statistics::restricted::{independent, paired};
-use statistics::survival::Survival;
-use statistics::unpaired::welch;
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::StandardError::Sample;
+use mirrorstats_statistics::comparisons::unpaired::welch;
+use mirrorstats_statistics::durations::competing::{Ending, Incidence, Outcome};
+use mirrorstats_statistics::durations::restricted::{independent, paired};
+use mirrorstats_statistics::durations::survival::Survival;
+use mirrorstats_statistics::intervals::bootstrap;
+use mirrorstats_statistics::intervals::clustered::{clustered, clustered_rate};
+use mirrorstats_statistics::intervals::interval::{Interval, student_t};
 
 const SEED: u64 = 20_260_115;
 const SAMPLES: usize = 4_000;

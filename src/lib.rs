@@ -86,19 +86,19 @@
 
 pub mod cli;
 
-pub use exact::moments::Moments;
-pub use report::bundle::Manifest;
-pub use report::cells::columns::record_batch;
-pub use report::cells::diff::{CellChange, Changes, Flip};
-pub use report::cells::{Cells, Group, KeyValue};
-pub use report::figures::{Figure, FigureFormat, FigureName, FigureWidth};
-pub use report::layout::MetricTable;
-pub use report::statistics::{Options as StatisticsOptions, Statistics};
-pub use report::tables::Table;
-pub use score::columns::record_batch as episode_batch;
-pub use score::evidence::Evidence;
-pub use score::table::{EpisodeKey, EpisodeTable, MetricColumn};
-pub use study::{
+pub use mirrorstats_exact::moments::Moments;
+pub use mirrorstats_report::bundle::Manifest;
+pub use mirrorstats_report::cells::columns::record_batch;
+pub use mirrorstats_report::cells::diff::{CellChange, Changes, Flip};
+pub use mirrorstats_report::cells::{Cells, Group, KeyValue};
+pub use mirrorstats_report::figures::{Figure, FigureFormat, FigureName, FigureWidth};
+pub use mirrorstats_report::layout::MetricTable;
+pub use mirrorstats_report::statistics::{Options as StatisticsOptions, Statistics};
+pub use mirrorstats_report::tables::Table;
+pub use mirrorstats_score::evidence::Evidence;
+pub use mirrorstats_score::tables::columns::record_batch as episode_batch;
+pub use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
+pub use mirrorstats_study::{
     Backend, Diff, DiffRequest, FigureOptions, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side,
     Study, StudyError, diff, resolve,
 };

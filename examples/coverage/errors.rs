@@ -1,12 +1,12 @@
 //! The rates at which tests and families of tests reject true hypotheses.
 
 use crate::tarone::{Attained, check_mcnemar_least_p, fisher_least_p, mcnemar_least_p, tarone_holm};
-use exact::ratio::Ratio;
-use statistics::chance;
-use statistics::holm::holm;
-use statistics::paired::Pairs;
-use statistics::random::SplitMix64;
-use statistics::unpaired::fisher;
+use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_statistics::chance;
+use mirrorstats_statistics::comparisons::holm::holm;
+use mirrorstats_statistics::comparisons::paired::Pairs;
+use mirrorstats_statistics::comparisons::unpaired::fisher;
+use mirrorstats_statistics::intervals::random::SplitMix64;
 
 use crate::{LEVEL, N, SEED, binomial, happens, heading, largest, rates, row, share, successes};
 

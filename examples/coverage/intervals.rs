@@ -1,9 +1,9 @@
 //! The coverage of intervals over several experiments.
 
-use statistics::improvement::probability_of_improvement;
-use statistics::interval::Interval;
-use statistics::random::SplitMix64;
-use statistics::stratified::{Stratum, common_difference, exact};
+use mirrorstats_statistics::comparisons::improvement::probability_of_improvement;
+use mirrorstats_statistics::comparisons::stratified::{Stratum, common_difference, exact};
+use mirrorstats_statistics::intervals::interval::Interval;
+use mirrorstats_statistics::intervals::random::SplitMix64;
 
 use crate::{CONFIDENCE, LEVEL, SEED, heading, row, share, successes, tally};
 

@@ -1,11 +1,11 @@
 //! The error rates of methods with a look after every episode.
 
-use exact::ratio::Ratio;
-use statistics::chance;
-use statistics::interval::{Interval, wilson};
-use statistics::paired::Pairs;
-use statistics::random::SplitMix64;
-use statistics::sequential::{against_level, confidence_sequence, discordant};
+use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_statistics::chance;
+use mirrorstats_statistics::comparisons::paired::Pairs;
+use mirrorstats_statistics::intervals::interval::{Interval, wilson};
+use mirrorstats_statistics::intervals::random::SplitMix64;
+use mirrorstats_statistics::sequential::{against_level, confidence_sequence, discordant};
 
 use crate::{CONFIDENCE, LEVEL, SEED, happens, heading, row, share, tally};
 

@@ -8,7 +8,7 @@ mod looks;
 mod tarone;
 mod units;
 
-use statistics::random::SplitMix64;
+use mirrorstats_statistics::intervals::random::SplitMix64;
 
 /// Every table draws from its own stream, so that a new table changes no other.
 const SEED: u64 = 20_260_101;

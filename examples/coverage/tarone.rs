@@ -7,8 +7,8 @@
 //! exists; `benches/COVERAGE.md` shows the simulated error. Use exact p values only, because a mid-p value may be below
 //! the least p value.
 
-use statistics::paired::Pairs;
-use statistics::unpaired::fisher;
+use mirrorstats_statistics::comparisons::paired::Pairs;
+use mirrorstats_statistics::comparisons::unpaired::fisher;
 
 /// The tolerance for reaching a least p value, because the same number may be computed in different ways.
 const TIE: f64 = 1e-12;
@@ -18,7 +18,7 @@ const TIE: f64 = 1e-12;
 pub struct Attained {
     /// The exact p value.
     pub p: f64,
-    /// The least attainable p value, at most `p`: [`statistics::chance::least_p`], [`mcnemar_least_p`],
+    /// The least attainable p value, at most `p`: [`mirrorstats_statistics::chance::least_p`], [`mcnemar_least_p`],
     /// [`fisher_least_p`].
     pub least: f64,
 }
@@ -52,7 +52,7 @@ pub fn fisher_least_p((k, m): (u64, u64), (l, n): (u64, u64)) -> Option<f64> {
 /// down like Holm. Tarone's own rule depends on the level: it may reject at 0.04 and not at 0.05. This one does not
 /// (Hommel and Krummenauer 1998, Biometrics 54:673). In ascending order, the i-th p value is multiplied by the number
 /// of tests from the i-th on whose least p value is not above it. No adjusted value exceeds that of
-/// [`statistics::holm::holm`].
+/// [`mirrorstats_statistics::comparisons::holm::holm`].
 #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
 pub fn tarone_holm(tests: &[Attained]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..tests.len()).collect();

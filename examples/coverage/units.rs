@@ -1,13 +1,13 @@
 //! Error rates of tests with repeated scenes: by scene, and as if episodes were independent.
 
-use exact::moments::Moments;
-use exact::ratio::Ratio;
-use statistics::chance;
-use statistics::clustered::fewest_clusters;
-use statistics::holm::holm;
-use statistics::random::SplitMix64;
-use statistics::units::{Sides, difference_test, rate_test};
-use statistics::unpaired::fisher;
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_statistics::chance;
+use mirrorstats_statistics::comparisons::holm::holm;
+use mirrorstats_statistics::comparisons::units::{Sides, difference_test, rate_test};
+use mirrorstats_statistics::comparisons::unpaired::fisher;
+use mirrorstats_statistics::intervals::clustered::fewest_clusters;
+use mirrorstats_statistics::intervals::random::SplitMix64;
 
 use crate::{LEVEL, SEED, happens, heading, row, share};
 

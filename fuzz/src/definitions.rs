@@ -3,11 +3,11 @@
 use std::num::NonZeroUsize;
 use std::sync::LazyLock;
 
-use metric::columns::Columns;
-use metric::definitions::Definitions;
-use metric::sql::{self, Dialect};
-use score::score_traces;
-use score::vocabulary;
+use mirrorstats_metric::columns::Columns;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_metric::sql::{self, Dialect};
+use mirrorstats_score::score_traces;
+use mirrorstats_score::vocabulary;
 
 use crate::depth::reached;
 use crate::episodes;

@@ -1,9 +1,9 @@
 //! A few episodes and their trace, for every target that needs some.
 
-use ::trace::episode::{Action, Episode, Extra, Step};
-use ::trace::inputs::Input;
-use ::trace::open::TraceSet;
-use ::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use crate::scratch;
 

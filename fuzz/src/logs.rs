@@ -4,13 +4,13 @@ use std::io::Cursor;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use ::trace::diagnostic::Severity;
-use ::trace::inputs::Input;
-use ::trace::log::assemble;
-use ::trace::log::recover::{Recovered, recover_from};
-use ::trace::merge;
-use ::trace::validate::validate;
-use ::trace::write::OptionalColumns;
+use mirrorstats_trace::diagnostic::Severity;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::log::assemble;
+use mirrorstats_trace::log::recover::{Recovered, recover_from};
+use mirrorstats_trace::validate::validate;
+use mirrorstats_trace::write::OptionalColumns;
+use mirrorstats_trace::write::merge;
 use serde_json::json;
 
 use crate::depth::reached;

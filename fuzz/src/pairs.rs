@@ -8,9 +8,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use study::{Question, ReportOptions, Study};
-use trace::inputs::Input;
-use view::{Options, View};
+use mirrorstats_study::{Question, ReportOptions, Study};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_view::{Options, View};
 
 use crate::depth::reached;
 use crate::{episodes, scratch};

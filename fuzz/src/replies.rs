@@ -2,11 +2,11 @@
 
 use std::fs;
 
-use world::agent::Status;
-use world::agent::reply::{self, Ending};
-use world::agent::vlm::journal::{Entry, Journal, Recorded};
-use world::agent::vlm::wire_format::Dialect;
-use world::experiment::Experiment;
+use mirrorstats_world::agent::Status;
+use mirrorstats_world::agent::reply::{self, Ending};
+use mirrorstats_world::agent::vlm::journal::{Entry, Journal, Recorded};
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_world::experiment::Experiment;
 
 use crate::depth::reached;
 use crate::scratch;

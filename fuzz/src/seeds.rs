@@ -5,20 +5,20 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use ::trace::log::message::Decision;
-use ::trace::log::write::EpisodeLog;
-use ::trace::log::{assemble, topic};
-use metric::definitions::Definitions;
-use metric::file::{built_in, built_in_names};
-use report::plan::register::{NamedHash, RegisteredPlan};
-use report::plan::{Given, PlanRequest, plan};
-use score::format::{self, Format};
-use score::score_traces;
-use score::vocabulary;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_metric::file::{built_in, built_in_names};
+use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_report::plan::{Given, PlanRequest, plan};
+use mirrorstats_score::format::{self, Format};
+use mirrorstats_score::score_traces;
+use mirrorstats_score::vocabulary;
+use mirrorstats_statistics::sample_size::Clusters;
+use mirrorstats_trace::log::message::Decision;
+use mirrorstats_trace::log::write::EpisodeLog;
+use mirrorstats_trace::log::{assemble, topic};
+use mirrorstats_world::agent::vlm::journal::Entry;
+use mirrorstats_world::sim::config::WorldConfig;
 use serde_json::{Value, json};
-use statistics::sample_size::Clusters;
-use world::agent::vlm::journal::Entry;
-use world::sim::config::WorldConfig;
 
 use crate::{episodes, pages, pairs, scratch, traces};
 
@@ -120,7 +120,7 @@ fn page_seeds() -> Vec<Vec<u8>> {
 }
 
 fn lines() -> Vec<Vec<u8>> {
-    let of_episode = |episode: &::trace::episode::Episode| {
+    let of_episode = |episode: &mirrorstats_trace::episodes::episode::Episode| {
         let line = |(t, step)| {
             let mut row = json!(episode);
             let decision = json!(Decision::of(t, step));
@@ -145,7 +145,7 @@ fn logs() -> Vec<Vec<u8>> {
     let mut parts = Vec::new();
     for (at, episode) in episodes::episodes(3).into_iter().enumerate() {
         let path = scratch::path(&format!("part-{at}.mcap"));
-        let head = ::trace::episode::Episode { steps: Vec::new(), ..episode.clone() };
+        let head = mirrorstats_trace::episodes::episode::Episode { steps: Vec::new(), ..episode.clone() };
         let mut log =
             EpisodeLog::create(&path, &head, &json!({ "type": "object" }), 1).expect("a folder for temporary files");
         for (t, step) in (1..).zip(&episode.steps) {

@@ -4,13 +4,13 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use ::trace::diagnostic::Severity;
-use ::trace::error::TraceError;
-use ::trace::import::{Limits, Text, import};
-use ::trace::inputs::Input;
-use ::trace::open::TraceSet;
-use ::trace::scan::Projection;
-use ::trace::validate::validate;
+use mirrorstats_trace::diagnostic::Severity;
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::import::{Limits, Text, import};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::scan::Projection;
+use mirrorstats_trace::validate::validate;
 
 use crate::depth::reached;
 use crate::{episodes, scratch};
@@ -59,7 +59,7 @@ fn scan_and_validate(path: &Path) {
         rows += found;
         Ok(())
     };
-    let each = |batch: ::trace::scan::EpisodeBatch| Ok::<_, TraceError>(batch.steps.num_rows() as u64);
+    let each = |batch: mirrorstats_trace::scan::EpisodeBatch| Ok::<_, TraceError>(batch.steps.num_rows() as u64);
     if set.scan(&projection, NonZeroUsize::MIN, each, count).is_ok() {
         reached("rows");
         assert_eq!(report.count(Severity::Error), 0, "a scan reads what `validate` refuses: {:?}", report.findings);

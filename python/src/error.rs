@@ -6,10 +6,10 @@ use std::path::Path;
 
 use mirrorstats::StudyError;
 use mirrorstats::cli::{ErrorAnswer, Failure};
+use mirrorstats_toml_spec::FaultRecord;
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::import::{Fault, ImportError};
 use pyo3::prelude::*;
-use toml_spec::FaultRecord;
-use trace::error::TraceError;
-use trace::import::{Fault, ImportError};
 
 /// The error of a study, in the class that shows what to change.
 pub fn of_study(error: StudyError) -> PyErr {

@@ -8,12 +8,12 @@ use std::time::Duration;
 
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
 use mirrorstats::cli::{self, Failure, Options};
+use mirrorstats_world::agent::Player;
+use mirrorstats_world::agent::exec::Images;
+use mirrorstats_world::agent::function::{Function, FunctionPlayer, Listener};
+use mirrorstats_world::record::lock::{FolderLock, parts_of};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use world::agent::Player;
-use world::agent::exec::Images;
-use world::agent::function::{Function, FunctionPlayer, Listener};
-use world::record::lock::{FolderLock, parts_of};
 
 use crate::answer::{self, Answer};
 use crate::error;

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use mirrorstats::{FigureFormat, MetricTable};
+use mirrorstats_report::tables::Terminal;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use report::tables::Terminal;
 
 use crate::error;
 
@@ -153,7 +153,7 @@ impl Figure {
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| {
             let bytes = self.encode(FigureFormat::of(&path).map_err(error::of_argument)?)?;
-            exact::replace::replace(&path, &bytes).map_err(|fault| error::of_writing(&path, &fault))
+            mirrorstats_exact::replace::replace(&path, &bytes).map_err(|fault| error::of_writing(&path, &fault))
         })
     }
 

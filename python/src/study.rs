@@ -6,12 +6,12 @@ use std::sync::{Arc, OnceLock};
 
 use arrow::array::RecordBatch;
 use mirrorstats::{FigureName, FigureOptions, ReportOptions, StatisticsOptions};
+use mirrorstats_report::changes::Limit;
+use mirrorstats_report::figures::InvalidWidth;
+use mirrorstats_report::gate::{GateFormat, GateOptions};
+use mirrorstats_report::statistics::text::Length;
+use mirrorstats_study::{LostAs, Question};
 use pyo3::prelude::*;
-use report::changes::Limit;
-use report::figures::InvalidWidth;
-use report::gate::{GateFormat, GateOptions};
-use report::statistics::text::Length;
-use study::{LostAs, Question};
 
 use crate::answer::{self, Answer};
 use crate::columns::{Steps, Table};

@@ -18,10 +18,10 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
-use exact::budget::{self, Limit};
-use exact::escape::visible;
-use exact::{input, suggest};
-use toml_spec::{Fault, Faults, Place, Source, parse_toml};
+use mirrorstats_exact::budget::{self, Limit};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::{input, suggest};
+use mirrorstats_toml_spec::{Fault, Faults, Place, Source, parse_toml};
 
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file; if it is empty, no file is read.

@@ -23,10 +23,10 @@ use std::process::ExitCode;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
 use commands::Command;
-use exact::budget;
-use exact::escape::visible;
+use mirrorstats_exact::budget;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_trace::catch_panic::caught;
 use outcome::{ErrorFormat, Outcome};
-use trace::catch_panic::caught;
 
 pub use answers::{printed_schema, schemas};
 pub use outcome::{ErrorAnswer, Failure};

@@ -19,9 +19,9 @@ use std::io::{self, Write as _};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use exact::escape::visible_lines;
-use toml_spec::{FaultRecord, Faults};
-use trace::diagnostic::{MORE_FILES, is_short_of_files};
+use mirrorstats_exact::escape::visible_lines;
+use mirrorstats_toml_spec::{FaultRecord, Faults};
+use mirrorstats_trace::diagnostic::{MORE_FILES, is_short_of_files};
 
 /// The form of errors if no option sets it; read before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";

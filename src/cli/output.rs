@@ -10,11 +10,11 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::cli::{Failure, Outcome};
-use exact::escape::visible_lines;
-use exact::replace::{self, Content, FolderFiles, NewFile};
-use trace::checksums::stale_note;
-use trace::inputs::Input;
-use trace::open::TraceFile;
+use mirrorstats_exact::escape::visible_lines;
+use mirrorstats_exact::replace::{self, Content, FolderFiles, NewFile};
+use mirrorstats_trace::footers::checksums::stale_note;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceFile;
 
 /// Prints an answer: text for people or JSON for programs.
 pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, Failure> {

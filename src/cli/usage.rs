@@ -4,7 +4,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Error};
 
 use crate::cli::features;
-use exact::suggest;
+use mirrorstats_exact::suggest;
 
 const OF_SIM: [&str; 2] = ["record", "world"];
 

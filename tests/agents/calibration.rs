@@ -6,10 +6,10 @@ use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 
-use world::agent::scripted::Scripted;
-use world::record::plan::Key;
-use world::sim::Experiment;
-use world::sim::config::WorldConfig;
+use mirrorstats_world::agent::scripted::Scripted;
+use mirrorstats_world::record::plan::Key;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::config::WorldConfig;
 
 use crate::profile::{Profiles, chance_interval};
 use crate::recorded::{record_all, record_in, score};

@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex};
 
 use mirrorstats::cli;
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
+use mirrorstats_world::agent::exec::Images;
+use mirrorstats_world::agent::exec::message::Message;
+use mirrorstats_world::agent::function::{Function, FunctionPlayer, Listener};
 use serde_json::Value;
-use world::agent::exec::Images;
-use world::agent::exec::message::Message;
-use world::agent::function::{Function, FunctionPlayer, Listener};
 
 use crate::harness::files::write_small_world;
 use crate::harness::need;

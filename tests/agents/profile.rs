@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use score::table::EpisodeTable;
+use mirrorstats_score::tables::table::EpisodeTable;
 
 /// The sum of a metric over the episodes where it is defined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_trace::episodes::episode::{Action, Extra, Step};
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+use mirrorstats_world::experiment::{Experiment, Spec};
 use serde_json::{Value, json};
-use trace::episode::{Action, Extra, Step};
-use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
-use world::experiment::{Experiment, Spec};
 
 use crate::harness::program::run;
 use crate::harness::traces;
@@ -68,7 +68,7 @@ fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
 
     let (before, after) =
         (traces::episodes(&at.join("own.parquet")), traces::episodes(&at.join("new-traces/own.parquet")));
-    let of = |episodes: &[trace::episode::Episode], value: fn(&Step) -> Option<String>| {
+    let of = |episodes: &[mirrorstats_trace::episodes::episode::Episode], value: fn(&Step) -> Option<String>| {
         episodes.iter().flat_map(|episode| episode.steps.iter().map(value)).collect::<Vec<_>>()
     };
     let action = |step: &Step| step.action.map(|action| action.name().to_owned());
@@ -108,7 +108,7 @@ fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
     assert_eq!((&reparsed["diverged"], &reparsed["replies"]), (&diverged, &json!(5)));
     assert_eq!(
         traces::recording(&at.join("new-traces/own.parquet"))["agent"]["identification_version"],
-        trace::identification::VERSION
+        mirrorstats_trace::episodes::identification::VERSION
     );
     run(at, &["trace", "validate", "new-traces"]).ends(0);
 

@@ -1,10 +1,10 @@
 //! Replies as models write them, and how each is read.
 
-use trace::episode::Action;
-use trace::identification::normal_form;
-use world::agent::reply::{self, Ending, Repair};
-use world::agent::{Reply, Status};
-use world::experiment::Experiment;
+use mirrorstats_trace::episodes::episode::Action;
+use mirrorstats_trace::episodes::identification::normal_form;
+use mirrorstats_world::agent::reply::{self, Ending, Repair};
+use mirrorstats_world::agent::{Reply, Status};
+use mirrorstats_world::experiment::Experiment;
 
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 
@@ -356,7 +356,7 @@ fn an_ending_counts_before_the_text() {
 #[test]
 fn the_raw_text_is_kept_whatever_it_is() {
     let raw = "no JSON at all";
-    let reply = read(raw).with_text(raw.to_owned(), world::agent::Usage::default());
+    let reply = read(raw).with_text(raw.to_owned(), mirrorstats_world::agent::Usage::default());
     assert_eq!((reply.status, reply.raw.as_deref()), (Status::ParseFailed, Some(raw)));
 }
 
@@ -370,7 +370,7 @@ fn answers_of_an_experiment_are_read_by_their_types() {
     };
     for (written, read) in [(r#"" LEFT ""#, Some("left")), (r#""unknown""#, Some("unknown")), (r#""""#, None)] {
         let reading = with(written);
-        let side = reading.answers.get("side").map(trace::answers::Answered::text);
+        let side = reading.answers.get("side").map(mirrorstats_trace::episodes::answers::Answered::text);
         assert_eq!((reading.status, side.as_deref()), (Status::Ok, read), "{written}");
     }
     for (written, fault) in [

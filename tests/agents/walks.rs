@@ -1,11 +1,11 @@
 //! Whole episodes in painted rooms.
 
-use trace::episode::Action;
-use trace::palette::Color;
-use world::agent::perception::camera::{Place, Viewpoint};
-use world::agent::scripted::Scripted;
-use world::agent::{Reply, Task};
-use world::experiment::Experiment;
+use mirrorstats_trace::episodes::episode::Action;
+use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_world::agent::perception::camera::{Place, Viewpoint};
+use mirrorstats_world::agent::scripted::Scripted;
+use mirrorstats_world::agent::{Reply, Task};
+use mirrorstats_world::experiment::Experiment;
 
 use crate::painted::{Painted, pose, task};
 

@@ -1,7 +1,7 @@
 //! The battery's definitions, worked out by hand.
 
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::write_episodes;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 
 use crate::harness::traces;
 use crate::run;

@@ -6,8 +6,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use trace::episode::{Extra, Step};
-use trace::write::write_episodes;
+use mirrorstats_trace::episodes::episode::{Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 
 use crate::harness::bombs::log;
 use crate::harness::program::{answer, limited, run_with_input, succeeds};

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 use serde_json::{Value, json};
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::write_episodes;
 
 use crate::harness;
 use crate::harness::program::run;

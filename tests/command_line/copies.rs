@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::write::write_episodes;
 use serde_json::Value;
-use trace::episode::Episode;
-use trace::write::write_episodes;
 
 use crate::{episode, run};
 

@@ -5,10 +5,10 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use score::score_traces::{self, Request};
+use mirrorstats_score::score_traces::{self, Request};
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::write::write_episodes;
 use serde_json::{Value, json};
-use trace::episode::Episode;
-use trace::write::write_episodes;
 
 use crate::harness::traces::open;
 use crate::{contents, episode, run};

@@ -1,6 +1,6 @@
 //! Filters that keep no episode, and figures that limit the number of episodes.
 
-use trace::write::write_episodes;
+use mirrorstats_trace::write::write_episodes;
 
 use crate::{episode, run, two_files};
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use trace::schema::COLUMNS;
+use mirrorstats_trace::schema::COLUMNS;
 
 use crate::generation::{self, Files, OPTIONAL_COLUMNS, Order, Study};
 use crate::harness::traces::{score_values, texts};

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use trace::write::write_episodes;
+use mirrorstats_trace::write::write_episodes;
 
 use crate::pairs::missing;
 use crate::{Answer, contents, episode, run};

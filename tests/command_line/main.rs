@@ -51,8 +51,8 @@ mod widths;
 
 use harness::files::{contents, fixture};
 use harness::program::{Answer, program, run, run_with_input};
-use trace::episode::{Action, Episode, Step};
-use trace::write::write_episodes;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
+use mirrorstats_trace::write::write_episodes;
 
 /// An episode that sees the mirror at t = 2 and decides at t = 3.
 fn episode(model: &str, experiment: &str, run: i32, choice: &str) -> Episode {

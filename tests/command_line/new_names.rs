@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
+use mirrorstats_trace::write::OptionalColumns;
 use regex::Regex;
-use trace::episode::{Action, Episode, Step};
-use trace::write::OptionalColumns;
 
 use crate::harness::traces::{episode, write_trace};
 use crate::{contents, run};

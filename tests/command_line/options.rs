@@ -95,7 +95,7 @@ fn definitions_of_one_s_own_include_the_paper_s() {
 fn an_unknown_experiment_is_accepted_by_open_definitions() {
     let folder = tempfile::tempdir().unwrap();
     let episodes = [crate::episode("ant", "E9", 1, "red")];
-    trace::write::write_episodes(&folder.path().join("a.parquet"), None, &episodes).unwrap();
+    mirrorstats_trace::write::write_episodes(&folder.path().join("a.parquet"), None, &episodes).unwrap();
     let message = run(folder.path(), &["score", "a.parquet"]).refused();
     assert!(message.contains("`E9`") && message.contains("one of E1, E2, E3, E4, E5"), "{message}");
     assert!(message.contains("[experiment.NAME]") && message.contains("open = true"), "{message}");

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::Command;
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 use serde_json::{Value, json};
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::write_episodes;
 
 use crate::harness::program::PROGRAM;
 use crate::{harness, run};

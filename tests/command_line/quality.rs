@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use serde_json::{Value, json};
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 use crate::harness::program::run;
 use crate::harness::traces::{episode, write_trace};

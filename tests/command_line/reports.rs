@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use exact::hash;
+use mirrorstats_exact::hash;
 use serde_json::{Value, json};
 
 use crate::harness::files::Contents;

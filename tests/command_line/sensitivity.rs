@@ -3,13 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use exact::number::full_precision;
 use mirrorstats::Study;
+use mirrorstats_exact::number::full_precision;
+use mirrorstats_study::Thresholds;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use study::Thresholds;
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::write_episodes;
 
 use crate::assert_shown;
 use crate::harness::files::{assert_same, contents, fixture};

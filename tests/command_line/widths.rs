@@ -1,6 +1,6 @@
 //! Tables in terminals of any width.
 
-use trace::write::write_episodes;
+use mirrorstats_trace::write::write_episodes;
 
 use crate::episode;
 use crate::harness::program::{answer, program};

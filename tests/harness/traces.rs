@@ -6,16 +6,16 @@ use std::path::Path;
 use arrow::array::{ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::DataType;
+use mirrorstats_trace::episodes::episode::{Episode, Step};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::schema::RECORDING_KEY;
+use mirrorstats_trace::write::merge;
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::file::properties::WriterProperties;
 use serde_json::Value;
-use trace::episode::{Episode, Step};
-use trace::inputs::Input;
-use trace::merge;
-use trace::open::TraceSet;
-use trace::schema::RECORDING_KEY;
-use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 /// An episode of model `m` in E1.
 pub fn episode(id: &str, steps: Vec<Step>) -> Episode {

@@ -9,14 +9,14 @@ use toml::Table;
 /// The files that may name them, and why.
 const ALLOWED: [(&str, &str); 10] = [
     (
-        "crates/trace/src/schema/mod.rs",
+        "crates/mirrorstats_trace/src/schema/mod.rs",
         "what a trace without `decision` means, by the experiments of the first version",
     ),
-    ("crates/world/src/agent/prompt.rs", "the prompts of the paper under their names"),
-    ("crates/world/src/experiment/built_in.rs", "the list of the built-in files"),
-    ("crates/world/src/experiment/file.rs", "an example"),
-    ("crates/world/src/experiment/mod.rs", "the list of the built-in files"),
-    ("crates/world/src/record/plan.rs", "an example"),
+    ("crates/mirrorstats_world/src/agent/prompt.rs", "the prompts of the paper under their names"),
+    ("crates/mirrorstats_world/src/experiment/built_in.rs", "the list of the built-in files"),
+    ("crates/mirrorstats_world/src/experiment/file.rs", "an example"),
+    ("crates/mirrorstats_world/src/experiment/mod.rs", "the list of the built-in files"),
+    ("crates/mirrorstats_world/src/record/plan.rs", "an example"),
     ("src/cli/commands/trace/schema.rs", "two forms of a reply"),
     ("src/cli/commands/world/mod.rs", "which experiments are recorded by default"),
     ("src/cli/commands/world/record.rs", "which experiments are recorded by default"),

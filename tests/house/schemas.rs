@@ -3,33 +3,33 @@
 use std::fs;
 use std::path::PathBuf;
 
-use metric::explain::Explanation;
-use metric::shape::DefinitionFile;
 use mirrorstats::cli::printed_schema;
-use report::audit::Audit;
-use report::bundle::Manifest;
-use report::cells::diff::Changes;
-use report::comparison::PublishedComparison;
-use report::errata::Errata;
-use report::gate::Gate;
-use report::plan::Plan;
-use report::plan::register::RegisteredPlan;
-use report::sensitivity::Sensitivity;
-use report::statistics::{Sequential, Statistics};
-use report::style::StyleSheet;
+use mirrorstats_metric::logical_plan::explain::Explanation;
+use mirrorstats_metric::shape::DefinitionFile;
+use mirrorstats_report::audit::Audit;
+use mirrorstats_report::bundle::Manifest;
+use mirrorstats_report::cells::diff::Changes;
+use mirrorstats_report::comparison::PublishedComparison;
+use mirrorstats_report::errata::Errata;
+use mirrorstats_report::gate::Gate;
+use mirrorstats_report::plan::Plan;
+use mirrorstats_report::plan::register::RegisteredPlan;
+use mirrorstats_report::sensitivity::Sensitivity;
+use mirrorstats_report::statistics::{Sequential, Statistics};
+use mirrorstats_report::style::StyleSheet;
+use mirrorstats_score::evidence::Evidence;
+use mirrorstats_study::verify::Verification;
+use mirrorstats_study::{ImportAnswer, LabelAgreement, QualityCheckAnswer};
+use mirrorstats_trace::episodes::labels::LabelLine;
+use mirrorstats_trace::info::Info;
+use mirrorstats_trace::log::message::{Decision, EpisodeMessage};
+use mirrorstats_trace::schema::describe::SchemaDocument;
+use mirrorstats_trace::validate::Validation;
+use mirrorstats_trace::write::seal::SealAnswer;
+use mirrorstats_world::agent::reply;
+use mirrorstats_world::experiment::Experiment;
 use schemars::schema_for;
-use score::evidence::Evidence;
 use serde_json::{Value, json};
-use study::verify::Verification;
-use study::{ImportAnswer, LabelAgreement, QualityCheckAnswer};
-use trace::describe::SchemaDocument;
-use trace::info::Info;
-use trace::labels::LabelLine;
-use trace::log::message::{Decision, EpisodeMessage};
-use trace::seal::SealAnswer;
-use trace::validate::Validation;
-use world::agent::reply;
-use world::experiment::Experiment;
 
 fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("schemas")
@@ -68,14 +68,14 @@ fn current() -> Vec<(&'static str, Value)> {
     schemas.extend(mirrorstats::cli::schemas());
     #[cfg(feature = "sim")]
     schemas.extend([
-        ("participants-remove", json!(schema_for!(world::record::participants::Removed))),
-        ("census", json!(schema_for!(world::sim::visibility::Visibility))),
-        ("replay", json!(schema_for!(world::replay::verify::ReplayAnswer))),
-        ("exec-message", json!(schema_for!(world::agent::exec::message::Message))),
-        ("models", json!(schema_for!(world::agent::vlm::models::Models))),
-        ("lost", json!(schema_for!(world::record::failures::LostEpisode))),
-        ("scene", json!(schema_for!(world::sim::scene::Scene))),
-        ("world-config", json!(schema_for!(world::sim::config::WorldConfig))),
+        ("participants-remove", json!(schema_for!(mirrorstats_world::record::participants::Removed))),
+        ("census", json!(schema_for!(mirrorstats_world::sim::visibility::Visibility))),
+        ("replay", json!(schema_for!(mirrorstats_world::replay::verify::ReplayAnswer))),
+        ("exec-message", json!(schema_for!(mirrorstats_world::agent::exec::message::Message))),
+        ("models", json!(schema_for!(mirrorstats_world::agent::vlm::models::Models))),
+        ("lost", json!(schema_for!(mirrorstats_world::record::failures::LostEpisode))),
+        ("scene", json!(schema_for!(mirrorstats_world::sim::scene::Scene))),
+        ("world-config", json!(schema_for!(mirrorstats_world::sim::config::WorldConfig))),
     ]);
     schemas
 }

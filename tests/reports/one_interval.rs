@@ -8,9 +8,9 @@ use std::path::Path;
 
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Float64Type;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::OptionalColumns;
 use serde_json::Value;
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::OptionalColumns;
 
 use crate::harness::program::run;
 use crate::harness::traces::{episode, write_trace};

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::sync::LazyLock;
 
-use trace::episode::{Action, Episode, Step};
+use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 
 use crate::harness::files::fixture;
 

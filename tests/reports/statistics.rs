@@ -5,18 +5,18 @@ mod durations;
 mod losses;
 mod units;
 
-use exact::moments::Moments;
 use indexmap::IndexMap;
-use metric::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
-use report::cells::interval::ranges;
-use report::cells::{Cells, Group, KeyValue};
-use report::statistics::text::Length;
-use report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
-use score::lost_counts::LostCounts;
-use score::quality::CellKey;
-use score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
-use statistics::design::{Cluster, Design, DesignKind};
-use statistics::interval::Interval;
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
+use mirrorstats_report::cells::interval::ranges;
+use mirrorstats_report::cells::{Cells, Group, KeyValue};
+use mirrorstats_report::statistics::text::Length;
+use mirrorstats_report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
+use mirrorstats_score::quality::CellKey;
+use mirrorstats_score::tables::lost_counts::LostCounts;
+use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use mirrorstats_statistics::design::{Cluster, Design, DesignKind};
+use mirrorstats_statistics::intervals::interval::Interval;
 
 use crate::assert_shown;
 
@@ -204,7 +204,7 @@ fn cells_carry_counts_and_the_intervals_of_their_kind() {
     let found = statistics(&study());
     let cell = |experiment: &str, model: &str, metric: &str| {
         let key = [("experiment", experiment), ("model", model)];
-        let is_it = |cell: &&report::statistics::CellRow| {
+        let is_it = |cell: &&mirrorstats_report::statistics::CellRow| {
             cell.metric == metric && key.iter().all(|(name, value)| cell.key[*name] == KeyValue::Text((*value).into()))
         };
         found.cells.iter().find(is_it).unwrap()

@@ -6,10 +6,10 @@ use arrow::array::{Array as _, AsArray as _, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::DataType;
 use mirrorstats::{DiffRequest, Side, Study, StudyError, diff, episode_batch, resolve};
-use score::format::Format;
-use study::write_scores;
-use trace::episode::{Action, Extra, Step};
-use trace::write::{OptionalColumns, write_episodes};
+use mirrorstats_score::format::Format;
+use mirrorstats_study::write_scores;
+use mirrorstats_trace::episodes::episode::{Action, Extra, Step};
+use mirrorstats_trace::write::{OptionalColumns, write_episodes};
 
 use crate::harness::traces::{episode, rows, write_trace};
 

@@ -1,8 +1,8 @@
 //! The paper's ten metrics at the edges of their definitions; `by_hand.txt` holds steps and expected values.
 
-use exact::moments::StandardError;
-use report::cells::group::group;
-use trace::episode::{Action, Episode, Step};
+use mirrorstats_exact::moments::StandardError;
+use mirrorstats_report::cells::group::group;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 
 use crate::harness;
 use crate::traces::{score_paper, values};

@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use metric::definitions::Definitions;
-use score::vocabulary::trace_columns;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_score::vocabulary::trace_columns;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
 use serde_json::json;
-use trace::inputs::Input;
-use trace::open::TraceSet;
 
 use crate::harness::files::repository;
 use crate::harness::logs;

@@ -3,8 +3,8 @@
 
 use std::cmp::Ordering;
 
+use mirrorstats_trace::episodes::episode::{Episode, Step};
 use regex::Regex;
-use trace::episode::{Episode, Step};
 
 use crate::language::{Definition, Expr};
 

@@ -8,14 +8,14 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
+use mirrorstats_score::format::{self, Format};
+use mirrorstats_score::score_traces::{self, Request};
+use mirrorstats_trace::episodes::episode::Episode;
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
-use score::format::{self, Format};
-use score::score_traces::{self, Request};
 use tempfile::TempDir;
-use trace::episode::Episode;
 
 use crate::harness::files::{Contents, contents};
 use crate::harness::program::run;

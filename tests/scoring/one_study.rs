@@ -4,13 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use mirrorstats::{ReportOptions, Study, StudyError};
-use trace::write::OptionalColumns;
+use mirrorstats_trace::write::OptionalColumns;
 
 use crate::harness::traces::{episode, write_trace};
 
 fn trace(folder: &Path, name: &str, episodes: usize) -> PathBuf {
     let path = folder.join(name);
-    let named = |at| episode(&format!("{name}-{at}"), vec![trace::episode::Step::default(); 3]);
+    let named = |at| episode(&format!("{name}-{at}"), vec![mirrorstats_trace::episodes::episode::Step::default(); 3]);
     write_trace(&path, &(0..episodes).map(named).collect::<Vec<_>>(), OptionalColumns::NONE);
     path
 }

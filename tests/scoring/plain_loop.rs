@@ -1,7 +1,7 @@
 //! The ten metrics as plain loops over steps, written from the paper, compared with the definitions and the engine.
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 use proptest::prelude::*;
-use trace::episode::{Action, Episode, Step};
 
 use crate::random::episodes;
 use crate::traces::{score_paper, values};

@@ -1,10 +1,10 @@
 //! Random episodes: any column may be null, rows may follow `done`, and episodes may have one step.
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
-use trace::episode::{Action, Episode, Extra, Step};
 
 /// Null, one of two colours, or one of the column's other words.
 fn color(words: &[&'static str]) -> impl Strategy<Value = Option<String>> {

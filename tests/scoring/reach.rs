@@ -3,17 +3,17 @@
 use std::fs;
 use std::path::Path;
 
-use metric::definitions::Definitions;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_score::vocabulary::trace_columns;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::write::write_episodes;
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
-use score::vocabulary::trace_columns;
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::inputs::Input;
-use trace::open::TraceSet;
-use trace::write::write_episodes;
 
 use crate::harness::traces;
 use crate::metamorphic::engines::{Engine, Rows, answers_about};

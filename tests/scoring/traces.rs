@@ -3,13 +3,13 @@
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use metric::definitions::Definitions;
-use score::score_traces;
-use score::table::EpisodeTable;
-use score::vocabulary;
-use trace::episode::Episode;
-use trace::open::TraceSet;
-use trace::write::OptionalColumns;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_score::score_traces;
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::vocabulary;
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::write::OptionalColumns;
 
 use crate::harness::traces::{open, write_trace};
 

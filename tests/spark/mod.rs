@@ -11,7 +11,7 @@ mod stand_in;
 use crate::harness::files::fixture;
 use crate::harness::program::{Answer, answer, program};
 use crate::harness::traces::write_trace as write;
-use trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 
 /// An episode with texts that are easy to get wrong; seen at t = 2, decided at t = 3.
 fn episode(id: &str, experiment: &str, run: i32) -> Episode {

@@ -5,9 +5,9 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use mirrorstats_trace::episodes::episode::{Episode, Extra};
+use mirrorstats_trace::write::OptionalColumns;
 use serde_json::Value;
-use trace::episode::{Episode, Extra};
-use trace::write::OptionalColumns;
 
 use super::cluster::{Cluster, get, word_after};
 use super::{Answer, answer, episode, fixture, program, write};

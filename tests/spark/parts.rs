@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, Int32Array, Int64Array, RecordBatch, StringArray};
-use trace::write::OptionalColumns;
+use mirrorstats_trace::write::OptionalColumns;
 
 use super::{episode, write};
 use crate::harness::program::run;

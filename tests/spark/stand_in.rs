@@ -4,7 +4,7 @@ use std::fs;
 use std::net::TcpListener;
 use std::path::Path;
 
-use trace::write::{OptionalColumns, write_episodes};
+use mirrorstats_trace::write::{OptionalColumns, write_episodes};
 
 use super::{Answer, answer, episode, program, write};
 

@@ -5,12 +5,12 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use trace::diagnostic::{Code, Severity};
-use trace::error::TraceError;
-use trace::inputs::Input;
-use trace::open::TraceSet;
-use trace::scan::Projection;
-use trace::schema;
+use mirrorstats_trace::diagnostic::{Code, Severity};
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::scan::Projection;
+use mirrorstats_trace::schema;
 
 use crate::harness::files::fixture;
 use crate::harness::program::{answer, program, run};

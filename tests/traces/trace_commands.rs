@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_trace::diagnostic::Code;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::schema::COLUMNS;
+use mirrorstats_trace::write::write_episodes;
 use serde_json::{Value, json};
-use trace::diagnostic::Code;
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::schema::COLUMNS;
-use trace::write::write_episodes;
 
 use crate::harness::files::repository;
 use crate::harness::program::{Answer, run_with_input};

@@ -10,13 +10,13 @@ use arrow::array::{
     UInt32Array, UInt64Array,
 };
 use arrow::datatypes::{Float64Type, Int8Type, Int32Type, Int64Type};
+use mirrorstats_trace::diagnostic::Code;
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::scan::{EpisodeBatch, Projection};
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
-use trace::diagnostic::Code;
-use trace::error::TraceError;
-use trace::inputs::Input;
-use trace::open::TraceSet;
-use trace::scan::{EpisodeBatch, Projection};
 
 use crate::harness::traces::write_rows;
 

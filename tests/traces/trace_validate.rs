@@ -7,11 +7,11 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
-use trace::diagnostic::{Code, Severity};
-use trace::episode::{Action, Episode, Step};
-use trace::inputs::Input;
-use trace::validate::{Validation, validate};
-use trace::write::OptionalColumns;
+use mirrorstats_trace::diagnostic::{Code, Severity};
+use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::validate::{Validation, validate};
+use mirrorstats_trace::write::OptionalColumns;
 
 use crate::harness::traces;
 

@@ -2,14 +2,14 @@
 
 use std::fs;
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::write::merge;
+use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
 use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::inputs::Input;
-use trace::merge;
-use trace::open::TraceSet;
-use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
 
 use crate::harness::traces;
 

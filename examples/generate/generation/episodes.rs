@@ -1,6 +1,6 @@
 //! The generated study: models by experiments by seeds by runs, and the steps of each episode.
 
-use trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 
 use super::draw::Draw;
 use super::extras;

@@ -1,6 +1,6 @@
 //! Values of optional columns that agree with the required ones: poses follow actions, pixels follow `mirror_visible`.
 
-use trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 
 use super::draw::Draw;
 use super::episodes::COLORS;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 pub use episodes::Study;
 pub use order::Order;

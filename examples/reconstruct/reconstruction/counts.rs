@@ -1,6 +1,6 @@
 //! The number of a pair's 21 episodes with each property: the integers behind its rates.
 
-use exact::moments::Moments;
+use mirrorstats_exact::moments::Moments;
 
 use super::EPISODES;
 use super::contradiction::Contradiction;

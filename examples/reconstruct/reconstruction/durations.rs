@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use exact::moments::Moments;
+use mirrorstats_exact::moments::Moments;
 
 use super::contradiction::Contradiction;
 use super::generator::Generator;

@@ -1,6 +1,6 @@
 //! Turns an outline into an episode, step by step.
 
-use trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 
 use super::attribution::{self, UNKNOWN};
 use super::generator::Generator;

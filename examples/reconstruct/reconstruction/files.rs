@@ -6,10 +6,10 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 use serde_json::{Value, json};
-use trace::episode::Episode;
-use trace::error::TraceError;
-use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use super::contradiction::Contradiction;
 use super::published::{self, Pair, Reading};

@@ -3,7 +3,7 @@
 //! `SplitMix64` (Steele, Lea and Flood, 2014), written out so that no library release can change the fixture. Not for
 //! statistics: bounds are applied by multiplication, which is slightly uneven.
 
-use exact::hash;
+use mirrorstats_exact::hash;
 
 /// The generator's state.
 pub struct Generator(u64);

@@ -22,7 +22,7 @@ pub mod printing;
 pub mod published;
 pub mod scene;
 
-use trace::episode::Episode;
+use mirrorstats_trace::episodes::episode::Episode;
 
 use contradiction::Contradiction;
 use errata::Erratum;

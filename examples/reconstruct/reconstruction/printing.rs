@@ -1,7 +1,7 @@
 //! How the paper prints exact moments: two rounding rules and two standard errors.
 
-use exact::moments::Moments;
-use metric::catalog::StandardError;
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::StandardError;
 
 use super::published::{Pair, Source, Value};
 

@@ -15,8 +15,8 @@ use parquet::basic::ConvertedType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
-use parquet_pages::checksums::ChunkChecksums;
-use parquet_pages::{
+use mirrorstats_parquet_pages::checksums::ChunkChecksums;
+use mirrorstats_parquet_pages::{
     Column, Cursor, FaultSlot, Form, Library, Place, Refused, Store, normal_column, rows_of, text_type, verify,
     with_texts_as_keys,
 };

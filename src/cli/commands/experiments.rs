@@ -7,11 +7,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::{Failure, Outcome, experiments, output};
-use exact::escape::{visible, visible_lines};
-use exact::suggest::hint;
-use world::experiment::explain::explained;
-use world::experiment::file::Loaded;
-use world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
+use mirrorstats_exact::escape::{visible, visible_lines};
+use mirrorstats_exact::suggest::hint;
+use mirrorstats_world::experiment::explain::explained;
+use mirrorstats_world::experiment::file::Loaded;
+use mirrorstats_world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
 
 /// Check, explain and show experiments
 #[derive(Clone, Debug, clap::Args)]
@@ -71,7 +71,7 @@ impl ExperimentsArgs {
 
 #[cfg(feature = "sim")]
 fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
-    experiments::placed(file, &world::sim::config::WorldConfig::default())
+    experiments::placed(file, &mirrorstats_world::sim::config::WorldConfig::default())
 }
 
 #[cfg(not(feature = "sim"))]

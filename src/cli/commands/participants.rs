@@ -4,9 +4,9 @@ use std::fmt::{self, Write as _};
 use std::path::PathBuf;
 
 use crate::cli::{Failure, Outcome, output};
-use exact::escape::visible;
-use exact::format::counted;
-use world::record::participants::{self, Removed};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::format::counted;
+use mirrorstats_world::record::participants::{self, Removed};
 
 /// Remove people from a recording
 #[derive(Clone, Debug, clap::Args)]

@@ -10,9 +10,9 @@ use serde::Serialize;
 
 use crate::cli::config::{self, Setting};
 use crate::cli::{Cli, Failure, NAME, Outcome, help, output};
-use exact::escape::visible;
-use exact::replace::Content;
-use report::tables::Table;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::replace::Content;
+use mirrorstats_report::tables::Table;
 
 /// Show settings, write completions of a shell and manual pages
 #[derive(Debug, clap::Subcommand)]

@@ -4,12 +4,12 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
-use exact::escape::visible;
-use exact::suggest::hint;
-use metric::definitions::Definitions;
-use report::style::{Style, built_in, built_in_names};
-use score::vocabulary::schema_columns;
-use study::StudyError;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::suggest::hint;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_report::style::{Style, built_in, built_in_names};
+use mirrorstats_score::vocabulary::schema_columns;
+use mirrorstats_study::StudyError;
 
 /// Show and check styles: how tables look
 #[derive(Clone, Debug, clap::Args)]

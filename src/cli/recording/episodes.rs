@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 
 use crate::cli::Failure;
-use world::agent::Planned;
-use world::experiment::Experiment;
-use world::record::error::StoreError;
-use world::record::index::Place;
-use world::record::plan::{Key, Plan, Subject};
+use mirrorstats_world::agent::Planned;
+use mirrorstats_world::experiment::Experiment;
+use mirrorstats_world::record::error::StoreError;
+use mirrorstats_world::record::index::Place;
+use mirrorstats_world::record::plan::{Key, Plan, Subject};
 
 pub struct Episodes {
     pub planned: Vec<Key>,

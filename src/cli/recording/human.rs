@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::cli::{Failure, output};
-use exact::budget::Limit;
-use exact::input;
-use web::{self, Guard};
-use world::agent::human::Human;
-use world::agent::human::design::{Design, Order, Schedule};
-use world::agent::human::hub::{Eraser, Hub};
-use world::agent::human::journal::ParticipantJournal;
-use world::agent::human::seat::Terms;
-use world::agent::human::server::{self, Server};
-use world::record::participants::remove_episodes;
-use world::record::plan::Plan;
+use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::input;
+use mirrorstats_web::{self, Guard};
+use mirrorstats_world::agent::human::Human;
+use mirrorstats_world::agent::human::design::{Design, Order, Schedule};
+use mirrorstats_world::agent::human::hub::{Eraser, Hub};
+use mirrorstats_world::agent::human::journal::ParticipantJournal;
+use mirrorstats_world::agent::human::seat::Terms;
+use mirrorstats_world::agent::human::server::{self, Server};
+use mirrorstats_world::record::participants::remove_episodes;
+use mirrorstats_world::record::plan::Plan;
 
 /// The limit for the text of consent, which people read.
 const LONGEST_CONSENT: Limit = Limit::new("bytes of the words of consent", 1 << 20);
@@ -149,7 +149,7 @@ fn enrol(journal: &ParticipantJournal, code: &str, place: usize) -> io::Result<S
     if let Some((_, token)) = journal.enrolled(code) {
         return Ok(token.to_owned());
     }
-    let token = web::new_token()?;
+    let token = mirrorstats_web::new_token()?;
     journal.enrol(code, place, &token)?;
     Ok(token)
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::cli::Failure;
-use world::agent::Player;
+use mirrorstats_world::agent::Player;
 
 pub type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 

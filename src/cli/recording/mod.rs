@@ -21,17 +21,17 @@ use serde::Serialize;
 
 use crate::cli::NAME;
 use crate::cli::scoring::commands;
-use exact::escape::visible;
-use exact::format::{counted, fixed};
-use exact::number::Decimal;
-use report::html;
-use study::{Study, StudyError};
-use trace::renderer::Renderer;
-use trace::replies::ReplyCounts;
-use world::agent::vlm::limits::Spend;
-use world::record::failures::LostEpisode;
-use world::record::replies::{RepliesAnswer, UnreadableReply};
-use world::record::shares::Spent;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::format::{counted, fixed};
+use mirrorstats_exact::number::Decimal;
+use mirrorstats_report::html;
+use mirrorstats_study::{Study, StudyError};
+use mirrorstats_trace::episodes::replies::ReplyCounts;
+use mirrorstats_trace::renderer::Renderer;
+use mirrorstats_world::agent::vlm::limits::Spend;
+use mirrorstats_world::record::failures::LostEpisode;
+use mirrorstats_world::record::replies::{RepliesAnswer, UnreadableReply};
+use mirrorstats_world::record::shares::Spent;
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -220,8 +220,8 @@ mod tests {
     use std::time::Duration;
 
     use super::{dollars, shares, spent};
-    use world::agent::vlm::limits::Spend;
-    use world::record::shares::Spent;
+    use mirrorstats_world::agent::vlm::limits::Spend;
+    use mirrorstats_world::record::shares::Spent;
 
     #[test]
     fn unknown_costs_are_printed_as_unknown() {

@@ -3,10 +3,10 @@
 use std::io;
 
 use crate::cli::recording::dollars;
-use exact::escape::{visible, visible_lines};
-use exact::format::counted;
-use world::agent::vlm::probe::{ProbeAnswer, ProbedParameter};
-use world::agent::vlm::provider::rate_limit::RateLimit;
+use mirrorstats_exact::escape::{visible, visible_lines};
+use mirrorstats_exact::format::counted;
+use mirrorstats_world::agent::vlm::probe::{ProbeAnswer, ProbedParameter};
+use mirrorstats_world::agent::vlm::provider::rate_limit::RateLimit;
 
 pub(crate) fn tell(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result<()> {
     let (model, id) = (visible(&answer.model), visible(&answer.id));

@@ -13,9 +13,9 @@ use toml::de::{DeString, DeTable, DeValue};
 use crate::cli::config::{self, OptionFile};
 use crate::cli::recording::{RecordAnswer, Recorded};
 use crate::cli::{Failure, NAME, Options, Outcome};
-use exact::budget::{Budget, Limit};
-use exact::{input, suggest};
-use toml_spec::{Source, parse_toml};
+use mirrorstats_exact::budget::{Budget, Limit};
+use mirrorstats_exact::{input, suggest};
+use mirrorstats_toml_spec::{Source, parse_toml};
 
 const LARGEST: Limit = Limit::new("bytes of a study file", 1 << 20);
 const MOST_RECORDINGS: Limit = Limit::new("recordings of a study, conditions times models", 2000);

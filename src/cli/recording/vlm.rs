@@ -8,18 +8,18 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use crate::cli::{Failure, output};
-use exact::escape::visible;
-use trace::model_id::OWN_SERVER;
-use world::agent::vlm::Vlm;
-use world::agent::vlm::limits::{Account, Limits, Spend};
-use world::agent::vlm::models::{Choice, Models, ModelsError};
-use world::agent::vlm::probe::{ProbeAnswer, probe};
-use world::agent::vlm::provider::{Patience, Provider, check_transport};
-use world::agent::vlm::secrets::Secret;
-use world::agent::vlm::wire_format::{Dialect, Effort};
-use world::agent::{Agent, Lost, Player, Task};
-use world::experiment::Spec;
-use world::record::plan::slug;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_trace::episodes::model_id::OWN_SERVER;
+use mirrorstats_world::agent::vlm::Vlm;
+use mirrorstats_world::agent::vlm::limits::{Account, Limits, Spend};
+use mirrorstats_world::agent::vlm::models::{Choice, Models, ModelsError};
+use mirrorstats_world::agent::vlm::probe::{ProbeAnswer, probe};
+use mirrorstats_world::agent::vlm::provider::{Patience, Provider, check_transport};
+use mirrorstats_world::agent::vlm::secrets::Secret;
+use mirrorstats_world::agent::vlm::wire_format::{Dialect, Effort};
+use mirrorstats_world::agent::{Agent, Lost, Player, Task};
+use mirrorstats_world::experiment::Spec;
+use mirrorstats_world::record::plan::slug;
 
 /// A service tier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

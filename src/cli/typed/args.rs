@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 
-use engines::spark::setting::Setting;
+use mirrorstats_engines::spark::setting::Setting;
 
 /// The traces to read.
 #[derive(Clone, Debug, clap::Args)]

@@ -6,13 +6,13 @@ use std::path::Path;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
 use crate::cli::Failure;
-use world::experiment::file::{self, FileError, Loaded};
+use mirrorstats_world::experiment::file::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
 use {
-    toml_spec::{Fault, Faults},
-    world::experiment::Experiment,
-    world::record::plan::{Experiments, Named},
-    world::sim::{config::WorldConfig, placement},
+    mirrorstats_toml_spec::{Fault, Faults},
+    mirrorstats_world::experiment::Experiment,
+    mirrorstats_world::record::plan::{Experiments, Named},
+    mirrorstats_world::sim::{config::WorldConfig, placement},
 };
 
 /// Parses typed experiments; a file name may have any bytes.

@@ -7,14 +7,14 @@ use std::path::Path;
 
 use crate::cli::args::{Engine, EngineArgs, GroupingArgs, LostArg, ScoringArgs, SparkArgs, TraceArgs};
 use crate::cli::{Failure, NAME, output};
-use engines::spark::Cluster;
-use exact::budget::Limit;
-use exact::escape::visible;
-use exact::input;
-use report::html;
-use report::plan::register::RegisteredPlan;
-use study::{Backend, LostAs, Question, ScoredAlike, Study, StudyError, resolve};
-use trace::inputs::Input;
+use mirrorstats_engines::spark::Cluster;
+use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::input;
+use mirrorstats_report::html;
+use mirrorstats_report::plan::register::RegisteredPlan;
+use mirrorstats_study::{Backend, LostAs, Question, ScoredAlike, Study, StudyError, resolve};
+use mirrorstats_trace::inputs::Input;
 
 impl TraceArgs {
     /// The files given on the command line.

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 
 use base64::Engine as _;
+use mirrorstats_world::agent::exec::message::Message;
+use mirrorstats_world::agent::reply;
+use mirrorstats_world::experiment::Experiment;
 use schemars::schema_for;
 use serde_json::Value;
-use world::agent::exec::message::Message;
-use world::agent::reply;
-use world::experiment::Experiment;
 
 use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
 use crate::harness::files::repository;

@@ -200,7 +200,7 @@ fn an_edited_program_is_another_agent() {
     let before = contents(&bench.path("runs"));
     let footer = recording(&bench.path("runs/E1-exec.parquet"))["agent"].clone();
     // One line: the position of the word and the hash of the file's contents.
-    let hash = |bytes: &[u8]| exact::hash::of_bytes(bytes);
+    let hash = |bytes: &[u8]| mirrorstats_exact::hash::of_bytes(bytes);
     assert_eq!(footer["files"], hash(format!("2 {}\n", hash(&script)).as_bytes()));
     assert!(!footer.to_string().contains("program.sh"), "{footer}");
 

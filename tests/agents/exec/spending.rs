@@ -1,8 +1,8 @@
 //! A model behind a server on loopback, from the command line: the spending is reported, and a failing server loses an
 //! episode under the failure's name.
 
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 use serde_json::Value;
-use world::agent::vlm::wire_format::Dialect;
 
 use super::recordings::{Bench, FORWARD, done, outcome};
 use crate::vlm::server::{JSON, Server, http, spoken};

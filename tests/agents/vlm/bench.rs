@@ -4,18 +4,18 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
+use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_world::agent::vlm::Vlm;
+use mirrorstats_world::agent::vlm::limits::{Account, Limits, Spend};
+use mirrorstats_world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
+use mirrorstats_world::agent::vlm::provider::{Patience, Provider};
+use mirrorstats_world::agent::vlm::secrets::Secret;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_world::agent::{Agent as _, Lost, Observation, Reply, Task};
+use mirrorstats_world::experiment::Experiment;
+use mirrorstats_world::experiment::spec::Stated;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
-use trace::frame::Frame;
-use world::agent::vlm::Vlm;
-use world::agent::vlm::limits::{Account, Limits, Spend};
-use world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
-use world::agent::vlm::provider::{Patience, Provider};
-use world::agent::vlm::secrets::Secret;
-use world::agent::vlm::wire_format::Dialect;
-use world::agent::{Agent as _, Lost, Observation, Reply, Task};
-use world::experiment::Experiment;
-use world::experiment::spec::Stated;
 
 use super::server::Server;
 

@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
 
+use mirrorstats_world::agent::prompt::{Prompt, Rendered};
+use mirrorstats_world::agent::reply;
+use mirrorstats_world::agent::vlm::limits::Limits;
+use mirrorstats_world::agent::vlm::wire_format::{Dialect, Effort};
+use mirrorstats_world::experiment::{Experiment, built_in_names};
 use serde_json::{Value, json};
-use world::agent::prompt::{Prompt, Rendered};
-use world::agent::reply;
-use world::agent::vlm::limits::Limits;
-use world::agent::vlm::wire_format::{Dialect, Effort};
-use world::experiment::{Experiment, built_in_names};
 
 use super::bench::{Bench, choice, observation, patience, task};
 use super::server::{Server, decision, whole};

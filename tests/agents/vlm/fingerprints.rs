@@ -1,7 +1,7 @@
 //! The fingerprint of an episode includes the model that answers.
 
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 use serde_json::Value;
-use world::agent::vlm::wire_format::Dialect;
 
 use super::recordings::Folder;
 use super::server::{Server, decision, ok, spoken};

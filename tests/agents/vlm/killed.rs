@@ -6,9 +6,9 @@ use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use exact::hash;
-use world::agent::vlm::journal::Entry;
-use world::agent::vlm::wire_format::Dialect;
+use mirrorstats_exact::hash;
+use mirrorstats_world::agent::vlm::journal::Entry;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 
 use super::recordings::{Folder, counting};
 use super::server::{JSON, Request, Server, http, whole};

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use mirrorstats_trace::episodes::episode::Action;
+use mirrorstats_world::agent::vlm::limits::Limits;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_world::agent::{Status, reply};
+use mirrorstats_world::experiment::Experiment;
 use serde_json::Value;
-use trace::episode::Action;
-use world::agent::vlm::limits::Limits;
-use world::agent::vlm::wire_format::Dialect;
-use world::agent::{Status, reply};
-use world::experiment::Experiment;
 
 use super::bench::{Bench, KEY};
 use super::recordings::Folder;

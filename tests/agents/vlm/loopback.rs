@@ -9,8 +9,8 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
+use mirrorstats_world::agent::vlm::journal::Entry;
 use serde_json::Value;
-use world::agent::vlm::journal::Entry;
 
 use super::bench::KEY;
 use super::recordings::Folder;

@@ -3,11 +3,11 @@
 use std::num::NonZeroU32;
 use std::sync::Arc;
 
-use trace::episode::Action;
-use world::agent::vlm::Vlm;
-use world::agent::vlm::limits::Limits;
-use world::agent::vlm::models::Model;
-use world::agent::vlm::wire_format::{Dialect, Effort};
+use mirrorstats_trace::episodes::episode::Action;
+use mirrorstats_world::agent::vlm::Vlm;
+use mirrorstats_world::agent::vlm::limits::Limits;
+use mirrorstats_world::agent::vlm::models::Model;
+use mirrorstats_world::agent::vlm::wire_format::{Dialect, Effort};
 
 use super::bench::{Bench, choice};
 use super::server::{Server, decision, http, whole};

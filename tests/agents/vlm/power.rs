@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::process::Stdio;
 
-use exact::hash;
-use world::agent::vlm::journal::Entry;
-use world::agent::vlm::wire_format::Dialect;
+use mirrorstats_exact::hash;
+use mirrorstats_world::agent::vlm::journal::Entry;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 
 use super::recordings::{Folder, counting};
 use super::server::{Request, Server, whole};

@@ -3,12 +3,12 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use mirrorstats_world::agent::Status;
+use mirrorstats_world::agent::reply::Repair;
+use mirrorstats_world::agent::vlm::limits::Limits;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_world::record::fingerprint::Fingerprint;
 use serde_json::{Value, json};
-use world::agent::Status;
-use world::agent::reply::Repair;
-use world::agent::vlm::limits::Limits;
-use world::agent::vlm::wire_format::Dialect;
-use world::record::fingerprint::Fingerprint;
 
 use super::bench::{Bench, KEY, choice, patience};
 use super::recordings::{Folder, counting};

@@ -2,10 +2,10 @@
 
 use std::net::TcpListener;
 
+use mirrorstats_world::agent::LostKind;
+use mirrorstats_world::agent::vlm::limits::Limits;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 use serde_json::json;
-use world::agent::LostKind;
-use world::agent::vlm::limits::Limits;
-use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::{Bench, KEY};
 use super::recordings::{Folder, counting};

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use mirrorstats_world::agent::vlm::journal::Entry;
 use tempfile::TempDir;
-use world::agent::vlm::journal::Entry;
 
 use super::bench::KEY;
 use super::server::{Request, Server, decision};

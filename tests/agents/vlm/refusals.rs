@@ -2,11 +2,11 @@
 
 use std::fs;
 
+use mirrorstats_world::agent::vlm::Vlm;
+use mirrorstats_world::agent::vlm::limits::Limits;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_world::agent::{Lost, Reply, Status};
 use serde_json::{Value, json};
-use world::agent::vlm::Vlm;
-use world::agent::vlm::limits::Limits;
-use world::agent::vlm::wire_format::Dialect;
-use world::agent::{Lost, Reply, Status};
 
 use super::bench::{Bench, KEY, choice};
 use super::recordings::{Folder, counting, rows};

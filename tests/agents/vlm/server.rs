@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 use serde_json::{Value, json};
-use world::agent::vlm::wire_format::Dialect;
 
 pub const JSON: &str = "content-type: application/json\r\n";
 

@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
+use mirrorstats_world::agent::Status;
+use mirrorstats_world::agent::reply::Repair;
+use mirrorstats_world::agent::vlm::limits::Limits;
+use mirrorstats_world::agent::vlm::provider::Patience;
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 use serde_json::json;
-use world::agent::Status;
-use world::agent::reply::Repair;
-use world::agent::vlm::limits::Limits;
-use world::agent::vlm::provider::Patience;
-use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::{Bench, KEY, patience};
 use super::server::{Conduct, JSON, Server, decision, endings, http, ok, spoken, whole};
@@ -179,7 +179,11 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
                 openai(json!({ "message": { "content": [{ "type": "reasoning_text", "text": decision("w") }] } })),
                 Status::Empty,
             ),
-            ("a call beside a text", openai(json!({ "message": called("I answer:", &decision("w")) })), Status::Repaired),
+            (
+                "a call beside a text",
+                openai(json!({ "message": called("I answer:", &decision("w")) })),
+                Status::Repaired,
+            ),
             (
                 "a call beside thoughts",
                 openai(json!({ "message": called("<think>{1}</think>", &decision("w")) })),

@@ -1,7 +1,7 @@
 //! Unreadable replies are reported when they arrive, at the end, and from the trace.
 
+use mirrorstats_world::agent::vlm::wire_format::Dialect;
 use serde_json::{Value, json};
-use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::KEY;
 use super::recordings::Folder;

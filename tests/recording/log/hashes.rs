@@ -5,13 +5,13 @@ use std::io::Cursor;
 use std::path::Path;
 
 use arrow::array::{ArrayRef, Int32Array};
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::episodes::episode_hash;
+use mirrorstats_trace::log::read::episode_hashes;
+use mirrorstats_trace::schema;
+use mirrorstats_trace::write::OptionalColumns;
+use mirrorstats_trace::write::merge::{self, EpisodeRows};
 use serde_json::Value;
-use trace::episode::Episode;
-use trace::episode_hash;
-use trace::log::read::episode_hashes;
-use trace::merge::{self, EpisodeRows};
-use trace::schema;
-use trace::write::OptionalColumns;
 
 use super::logs::{Desk, RECORDING, SHORT, ids, json, recovered};
 use crate::harness::files::{fixture, write_small_world};

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::LazyLock;
 
+use mirrorstats_trace::log::recover::{Recovered, recover_from};
 use serde_json::Value;
 use tempfile::TempDir;
-use trace::log::recover::{Recovered, recover_from};
 
 use crate::harness::files::write_small_world;
 use crate::harness::program::{program, run, succeeds, typed};

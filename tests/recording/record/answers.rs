@@ -2,9 +2,9 @@
 
 use std::fs;
 
-use trace::answers::Answered;
-use trace::episode::Episode;
-use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+use mirrorstats_trace::episodes::answers::Answered;
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 use super::recordings::Bench;
 use crate::harness::program::run;
@@ -63,7 +63,8 @@ fn one_declaration_gives_columns_of_answer_and_truth() {
     // Without custom definitions, an episode is right if the answer at `done` is the truth at that step.
     let right = |episode: &&Episode| {
         let last = episode.steps.last().unwrap();
-        last.action == Some(trace::episode::Action::Done) && last.extra.answer == last.extra.answer_truth
+        last.action == Some(mirrorstats_trace::episodes::episode::Action::Done)
+            && last.extra.answer == last.extra.answer_truth
     };
     run(bench.folder.path(), &["report", "runs", "--out", "report", "--no-figures"]).done();
     let cells = fs::read_to_string(bench.path("report/cells.csv")).unwrap();

@@ -2,9 +2,9 @@
 
 use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
 use arrow::datatypes::{Float32Type, Int32Type, Int64Type};
+use mirrorstats_trace::episodes::episode::Step;
+use mirrorstats_trace::schema::COLUMNS;
 use serde_json::{Value, json};
-use trace::episode::Step;
-use trace::schema::COLUMNS;
 
 use super::recordings::Bench;
 use crate::harness::files::{Contents, fixture, write_small_world};

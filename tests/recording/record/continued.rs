@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use arrow::array::{ArrayRef, Int32Array};
-use trace::log::recover::recover;
-use trace::merge;
+use mirrorstats_trace::log::recover::recover;
+use mirrorstats_trace::write::merge;
 
 use super::recordings::Bench;
 use crate::harness::files::assert_same;

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_trace::write::merge;
 use serde_json::{Value, json};
-use trace::merge;
 
 use super::recordings::Bench;
 use crate::harness::files::{assert_same, fixture};

@@ -2,9 +2,9 @@
 
 use std::process::Command;
 
+use mirrorstats_trace::episodes::episode_hash;
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use serde_json::Value;
-use trace::episode_hash;
-use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 use super::recordings::Bench;
 use crate::harness::need;

@@ -1,7 +1,7 @@
 //! A trace with one altered value diverges from its replay at that value.
 
+use mirrorstats_trace::episodes::episode::{Action, Episode};
 use serde_json::Value;
-use trace::episode::{Action, Episode};
 
 use super::traces::{copy, recorded, replay};
 use crate::harness::program::{stderr, stdout};

@@ -1,6 +1,6 @@
 //! Ground truth with another threshold or grid.
 
-use trace::episode_hash;
+use mirrorstats_trace::episodes::episode_hash;
 
 use super::traces::{WITH_SIGHT, copy, replay};
 use crate::harness::program::{program, stderr, stdout, succeeds};

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::LazyLock;
 
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::write::OptionalColumns;
+use mirrorstats_trace::write::merge;
 use serde_json::Value;
 use tempfile::TempDir;
-use trace::episode::Episode;
-use trace::merge;
-use trace::write::OptionalColumns;
 
 use crate::harness::files::write_small_world;
 use crate::harness::program::{program, succeeds, typed};

@@ -1,10 +1,10 @@
 //! The size of a reflection by field of view.
 
-use world::sim::Experiment;
-use world::sim::body::{Figure, Pose};
-use world::sim::config::WorldConfig;
-use world::sim::scene::Scene;
-use world::sim::world::World;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::body::{Figure, Pose};
+use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_world::sim::scene::Scene;
+use mirrorstats_world::sim::world::World;
 
 /// Pixels of the own body, 1.6 m in front of the mirror.
 fn own_pixels(fovy: f64) -> f64 {

@@ -1,20 +1,20 @@
 //! Effects of actions, obstacles, and collisions.
 
-use trace::episode::Action;
-use trace::palette::Color;
-use world::sim::Experiment;
-use world::sim::angle::Heading;
-use world::sim::body::{Figure, Pose, Stride};
-use world::sim::floor::distance;
-use world::sim::rng::Rng;
-use world::sim::world::World;
+use mirrorstats_trace::episodes::episode::Action;
+use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::angle::Heading;
+use mirrorstats_world::sim::body::{Figure, Pose, Stride};
+use mirrorstats_world::sim::floor::distance;
+use mirrorstats_world::sim::rng::Rng;
+use mirrorstats_world::sim::world::World;
 
 use super::poses::world;
 
 /// An empty place to walk in: E1 without cubes.
 fn empty() -> World {
     let drawn = world(Experiment::E2, 1);
-    let scene = world::sim::scene::Scene { cubes: Vec::new(), ..drawn.scene().clone() };
+    let scene = mirrorstats_world::sim::scene::Scene { cubes: Vec::new(), ..drawn.scene().clone() };
     let mut world = World::new(drawn.config(), scene).unwrap();
     stand(&mut world, [0.0, 0.0], 0);
     world

@@ -1,13 +1,13 @@
 //! The ten colours are distinct from each other and from the room, directly and in the mirror.
 
-use trace::palette::Color;
-use world::sim::Experiment;
-use world::sim::camera::Camera;
-use world::sim::config::WorldConfig;
-use world::sim::label_image::LabelImage;
-use world::sim::model::Item;
-use world::sim::visibility::{Shown, labels};
-use world::sim::world::World;
+use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::camera::Camera;
+use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_world::sim::label_image::LabelImage;
+use mirrorstats_world::sim::model::Item;
+use mirrorstats_world::sim::visibility::{Shown, labels};
+use mirrorstats_world::sim::world::World;
 
 use super::poses::{face_mirror, world};
 use crate::harness::need;

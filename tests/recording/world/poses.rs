@@ -1,14 +1,14 @@
 //! Worlds with all bodies at random places that do not overlap.
 
-use world::experiment::spec::Body;
-use world::sim::Experiment;
-use world::sim::angle::Heading;
-use world::sim::body::{Figure, Pose, Stride};
-use world::sim::config::WorldConfig;
-use world::sim::floor::{FloorPlan, distance};
-use world::sim::rng::Rng;
-use world::sim::scene::Scene;
-use world::sim::world::World;
+use mirrorstats_world::experiment::spec::Body;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::angle::Heading;
+use mirrorstats_world::sim::body::{Figure, Pose, Stride};
+use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_world::sim::floor::{FloorPlan, distance};
+use mirrorstats_world::sim::rng::Rng;
+use mirrorstats_world::sim::scene::Scene;
+use mirrorstats_world::sim::world::World;
 
 /// The initial world of an experiment and seed.
 pub fn world(experiment: Experiment, seed: i32) -> World {

@@ -3,17 +3,17 @@
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-use exact::hash;
-use trace::palette::Color;
-use world::sim::Experiment;
-use world::sim::body::{Figure, Pose};
-use world::sim::config::WorldConfig;
-use world::sim::floor::distance;
-use world::sim::model::Item;
-use world::sim::placement::Occlusion;
-use world::sim::scene::Scene;
-use world::sim::visibility::{Shown, labels};
-use world::sim::world::World;
+use mirrorstats_exact::hash;
+use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::body::{Figure, Pose};
+use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_world::sim::floor::distance;
+use mirrorstats_world::sim::model::Item;
+use mirrorstats_world::sim::placement::Occlusion;
+use mirrorstats_world::sim::scene::Scene;
+use mirrorstats_world::sim::visibility::{Shown, labels};
+use mirrorstats_world::sim::world::World;
 
 use crate::assert_shown;
 

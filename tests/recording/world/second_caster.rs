@@ -1,14 +1,14 @@
 //! `mirror_visible` by a second caster that shares no code with the first. It reflects each ray at the glass and
 //! follows it through the shapes in a log. The first caster looks from the mirrored eye instead.
 
-use trace::episode::Action;
-use world::experiment::Experiment;
-use world::experiment::spec::{Body, PaneKind};
-use world::sim::model::Item;
-use world::sim::rng::Rng;
-use world::sim::scene::{HungPane, Scene};
-use world::sim::snapshot::{Shape, Snapshot, Solid};
-use world::sim::world::World;
+use mirrorstats_trace::episodes::episode::Action;
+use mirrorstats_world::experiment::Experiment;
+use mirrorstats_world::experiment::spec::{Body, PaneKind};
+use mirrorstats_world::sim::model::Item;
+use mirrorstats_world::sim::rng::Rng;
+use mirrorstats_world::sim::scene::{HungPane, Scene};
+use mirrorstats_world::sim::snapshot::{Shape, Snapshot, Solid};
+use mirrorstats_world::sim::world::World;
 
 use super::poses::shaped;
 

@@ -1,10 +1,10 @@
 //! One eye draws many worlds alternately, and no world affects the next picture.
 
-use trace::episode::Action;
-use world::sim::Experiment;
-use world::sim::camera::Camera;
-use world::sim::config::WorldConfig;
-use world::sim::rng::Rng;
+use mirrorstats_trace::episodes::episode::Action;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::camera::Camera;
+use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_world::sim::rng::Rng;
 
 use super::poses::{face_mirror, scatter, world};
 use crate::harness::need;

@@ -2,16 +2,16 @@
 
 use std::ops::Range;
 
-use trace::frame::Frame;
-use trace::palette::Color;
-use world::experiment::spec::Body;
-use world::sim::Experiment;
-use world::sim::camera::{Camera, LabelCamera};
-use world::sim::config::WorldConfig;
-use world::sim::label_image::LabelImage;
-use world::sim::model::Item;
-use world::sim::visibility::{Shown, labels, labels_by_mujoco};
-use world::sim::world::World;
+use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_world::experiment::spec::Body;
+use mirrorstats_world::sim::Experiment;
+use mirrorstats_world::sim::camera::{Camera, LabelCamera};
+use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_world::sim::label_image::LabelImage;
+use mirrorstats_world::sim::model::Item;
+use mirrorstats_world::sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats_world::sim::world::World;
 
 use super::poses::{for_scattered, shaped};
 use crate::harness::need;

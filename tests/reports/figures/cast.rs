@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use exact::moments::Moments;
-use exact::ratio::Ratio;
 use indexmap::IndexMap;
-use metric::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
-use report::cells::{Cells, Group, KeyValue};
-use report::figures::Input;
-use report::figures::e5_outcomes::{OutcomeRow, Outcomes};
-use score::table::{Declared, EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
-use score::timeline::Timeline;
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
+use mirrorstats_report::cells::{Cells, Group, KeyValue};
+use mirrorstats_report::figures::Input;
+use mirrorstats_report::figures::e5_outcomes::{OutcomeRow, Outcomes};
+use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
+use mirrorstats_score::timeline::Timeline;
 
 const METRICS: [&str; 7] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "TSA-C"];
 const TITLES: [(&str, &str); 5] = [

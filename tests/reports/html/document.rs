@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use report::bundle::cells_csv;
-use report::html::HtmlError;
+use mirrorstats_report::bundle::cells_csv;
+use mirrorstats_report::html::HtmlError;
 
 use crate::html::scored::{PAPER, PAPER_PAGE, Report};
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use score::table::MetricColumn;
+use mirrorstats_score::tables::table::MetricColumn;
 use serde_json::json;
 
 use crate::harness::files::fixture;

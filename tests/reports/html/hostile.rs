@@ -1,7 +1,7 @@
 //! Names that look like markup or script, or that reorder letters.
 
-use score::builder::TableBuilder;
-use score::table::{EpisodeTable, KeyRef};
+use mirrorstats_score::tables::builder::TableBuilder;
+use mirrorstats_score::tables::table::{EpisodeTable, KeyRef};
 
 use crate::html::browser::Browser;
 use crate::html::document::tags;

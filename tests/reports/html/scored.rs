@@ -4,18 +4,18 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use report::bundle::{InputFile, Manifest};
-use report::cells::Cells;
-use report::cells::group::group;
-use report::figures::{self, FigureName};
-use report::html::{self, EmbeddedFigure, HtmlError, Page, Recordings};
-use report::layout;
-use report::layout::MetricTable;
-use report::statistics::{Options, Statistics};
-use report::style::Style;
-use score::score_traces::{self, Request};
-use score::table::EpisodeTable;
-use trace::{inputs, open::TraceSet};
+use mirrorstats_report::bundle::{InputFile, Manifest};
+use mirrorstats_report::cells::Cells;
+use mirrorstats_report::cells::group::group;
+use mirrorstats_report::figures::{self, FigureName};
+use mirrorstats_report::html::{self, EmbeddedFigure, HtmlError, Page, Recordings};
+use mirrorstats_report::layout;
+use mirrorstats_report::layout::MetricTable;
+use mirrorstats_report::statistics::{Options, Statistics};
+use mirrorstats_report::style::Style;
+use mirrorstats_score::score_traces::{self, Request};
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_trace::{inputs, read::open::TraceSet};
 
 use crate::harness::files::fixture;
 

@@ -97,25 +97,28 @@ fn unbreakable_parts_fit_half_a_printed_page() {
 }
 
 /// Episodes of many models, as in a large study.
-fn of_many(models: usize, experiments: usize, runs: usize) -> Vec<trace::episode::Episode> {
-    let step = |action, right: bool| trace::episode::Step {
+fn of_many(models: usize, experiments: usize, runs: usize) -> Vec<mirrorstats_trace::episodes::episode::Episode> {
+    let step = |action, right: bool| mirrorstats_trace::episodes::episode::Step {
         action: Some(action),
         self_color: Some(if right { "red" } else { "blue" }.into()),
         selected_cube: Some(if right { "red" } else { "blue" }.into()),
         mirror_visible: right,
-        ..trace::episode::Step::default()
+        ..mirrorstats_trace::episodes::episode::Step::default()
     };
     let episode = |model: usize, experiment: usize, run: usize| {
         let right = (model * 31 + run * 17 + experiment) % 50 < model;
-        trace::episode::Episode {
+        mirrorstats_trace::episodes::episode::Episode {
             episode_id: format!("E{experiment}/vendor-model-{model:02}/s{}/r{}", 1 + run / 7, 1 + run % 7),
             model: format!("vendor-model-{model:02}"),
             experiment: format!("E{experiment}"),
             seed: i32::try_from(1 + run / 7).unwrap(),
             run: i32::try_from(1 + run % 7).unwrap(),
             body_color: "red".into(),
-            steps: vec![step(trace::episode::Action::TurnLeft, right), step(trace::episode::Action::Done, right)],
-            ..trace::episode::Episode::default()
+            steps: vec![
+                step(mirrorstats_trace::episodes::episode::Action::TurnLeft, right),
+                step(mirrorstats_trace::episodes::episode::Action::Done, right),
+            ],
+            ..mirrorstats_trace::episodes::episode::Episode::default()
         }
     };
     let of_model =
@@ -126,7 +129,7 @@ fn of_many(models: usize, experiments: usize, runs: usize) -> Vec<trace::episode
 #[test]
 fn ten_thousand_episodes_of_fifty_models_are_four_megabytes() {
     let folder = tempfile::tempdir().unwrap();
-    trace::write::write_episodes(&folder.path().join("many.parquet"), None, &of_many(50, 5, 40)).unwrap();
+    mirrorstats_trace::write::write_episodes(&folder.path().join("many.parquet"), None, &of_many(50, 5, 40)).unwrap();
     let written = crate::harness::program::run(folder.path(), &["report", "many.parquet", "--out", "report"]);
     written.done();
     let page = std::fs::read_to_string(folder.path().join("report/report.html")).unwrap();

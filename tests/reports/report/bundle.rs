@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use report::bundle::{Bundle, BundleError, InputFile, Manifest, OutputFile, cells_csv, write};
-use report::cells::Cells;
-use report::layout::MetricTable;
-use report::style::Style;
+use mirrorstats_report::bundle::{Bundle, BundleError, InputFile, Manifest, OutputFile, cells_csv, write};
+use mirrorstats_report::cells::Cells;
+use mirrorstats_report::layout::MetricTable;
+use mirrorstats_report::style::Style;
 
 use crate::assert_shown;
 use crate::report::published;

@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use report::comparison::{PublishedComparison, choose, compare};
-use report::errata::Errata;
-use report::published::{Published, read};
-use report::style::Style;
+use mirrorstats_report::comparison::{PublishedComparison, choose, compare};
+use mirrorstats_report::errata::Errata;
+use mirrorstats_report::published::{Published, read};
+use mirrorstats_report::style::Style;
 
 use crate::assert_shown;
 use crate::report::published;

@@ -8,14 +8,14 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::sync::LazyLock;
 
-use exact::moments::Moments;
 use indexmap::IndexMap;
-use metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
-use metric::definitions::Definitions;
-use report::cells::{Cell as CellOf, Cells, Group, KeyValue};
-use report::layout::{self, MetricTable, Value, value};
-use report::style::Style;
-use score::vocabulary::schema_columns;
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind, Metric, StandardError};
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_report::cells::{Cell as CellOf, Cells, Group, KeyValue};
+use mirrorstats_report::layout::{self, MetricTable, Value, value};
+use mirrorstats_report::style::Style;
+use mirrorstats_score::vocabulary::schema_columns;
 
 /// The number of episodes behind every published cell.
 pub const EPISODES: u64 = 21;

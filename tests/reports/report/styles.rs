@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use report::style::Style;
+use mirrorstats_report::style::Style;
 
 use crate::assert_shown;
 use crate::report::published;

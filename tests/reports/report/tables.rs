@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use exact::moments::Moments;
-use metric::catalog::{Better, Catalog, Kind, StandardError};
-use report::cells::{Cells, Group, KeyValue};
-use report::layout::{self, MetricTable, Spread, Value};
-use report::style::Style;
-use report::tables::{Emphasis, Marks, Terminal};
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind, StandardError};
+use mirrorstats_report::cells::{Cells, Group, KeyValue};
+use mirrorstats_report::layout::{self, MetricTable, Spread, Value};
+use mirrorstats_report::style::Style;
+use mirrorstats_report::tables::{Emphasis, Marks, Terminal};
 
 use crate::assert_shown;
 use crate::report::published::{self, metric_of};

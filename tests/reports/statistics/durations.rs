@@ -1,9 +1,9 @@
 //! Durations are compared by restricted means. Intervals are given only where their coverage is as promised.
 
-use report::statistics::text::Length;
-use report::statistics::{Intervals, Options, Statistics};
-use statistics::coverage::{self, Withheld};
-use statistics::interval::Interval;
+use mirrorstats_report::statistics::text::Length;
+use mirrorstats_report::statistics::{Intervals, Options, Statistics};
+use mirrorstats_statistics::intervals::coverage::{self, Withheld};
+use mirrorstats_statistics::intervals::interval::Interval;
 
 use super::{Row, block, cells, contrast, recorded, statistics, study, table};
 use crate::html::scored::PAPER;
@@ -31,7 +31,8 @@ fn chance_is_tested_among_finished_episodes_too() {
         found.chance.iter().filter(move |row| row.metric == metric && row.key.experiment != "E5")
     };
     let changed = of("TSA").filter(|row| {
-        let same = |other: &&report::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
+        let same =
+            |other: &&mirrorstats_report::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)
     });
     assert_eq!((of("TSA").count(), changed.count()), (32, 6));

@@ -1,9 +1,9 @@
 //! Lost episodes, filters and pooling are reported with the verdicts that they affect.
 
-use report::statistics::text::Length;
-use report::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};
-use score::lost_counts::LostCounts;
-use score::quality::CellKey;
+use mirrorstats_report::statistics::text::Length;
+use mirrorstats_report::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};
+use mirrorstats_score::quality::CellKey;
+use mirrorstats_score::tables::lost_counts::LostCounts;
 
 use super::{RECORDED, Row, by_place, cells, labelled, recorded, table};
 

@@ -1,8 +1,8 @@
 //! Episodes whose experiments need different definitions, in one list: each is scored by its own.
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 use serde_json::{Value, json};
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::write_episodes;
 
 use crate::harness::program::run;
 use crate::harness::traces::episode;

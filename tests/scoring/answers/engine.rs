@@ -4,11 +4,11 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use engines::polars::answer::plan;
-use engines::polars::refused::QueryError;
-use engines::polars::run::PolarsError;
-use engines::polars::shared_file::write_file;
-use engines::polars::statement::{Table, check};
+use mirrorstats_engines::polars::answer::plan;
+use mirrorstats_engines::polars::refused::QueryError;
+use mirrorstats_engines::polars::run::PolarsError;
+use mirrorstats_engines::polars::shared_file::write_file;
+use mirrorstats_engines::polars::statement::{Table, check};
 use polars::prelude::{AnyValue, DataFrame, Engine, IntoLazy as _, LazyFrame, df};
 use serde_json::Value;
 
@@ -99,7 +99,7 @@ impl Tables {
     pub fn write(&self, folder: &Path) {
         for (table, frame) in self.frames() {
             let file = std::fs::File::create(folder.join(format!("{}.parquet", table.name()))).unwrap();
-            write_file(frame, engines::polars::answer::Format::Parquet, file).unwrap();
+            write_file(frame, mirrorstats_engines::polars::answer::Format::Parquet, file).unwrap();
         }
     }
 

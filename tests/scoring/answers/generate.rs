@@ -1,6 +1,6 @@
 //! Random statements of every accepted shape, function and cast.
 
-use engines::polars::accepted::{Arg, CASTS, FUNCTIONS, Kind, Role, Signature};
+use mirrorstats_engines::polars::accepted::{Arg, CASTS, FUNCTIONS, Kind, Role, Signature};
 
 /// Splitmix: the same statements on every machine.
 pub struct Draw(pub u64);

@@ -14,15 +14,15 @@ mod generate;
 
 use std::collections::BTreeMap;
 
-use engines::polars::shared_file::in_memory;
-use engines::polars::statement::{Table, check};
+use mirrorstats_engines::polars::shared_file::in_memory;
+use mirrorstats_engines::polars::statement::{Table, check};
 use polars::prelude::{IntoLazy as _, df};
 
 use engine::{Duckdb, Rows, Tables, sorted};
-use engines::polars::accepted::FUNCTIONS;
-use engines::polars::answer::{Format, plan};
-use engines::polars::refused::QueryError;
 use generate::{Generator, Statement};
+use mirrorstats_engines::polars::accepted::FUNCTIONS;
+use mirrorstats_engines::polars::answer::{Format, plan};
+use mirrorstats_engines::polars::refused::QueryError;
 
 struct Round {
     tables: Tables,

@@ -4,8 +4,8 @@ mod diff;
 mod rescore;
 mod worked;
 
-use trace::episode::{Action, Episode, Step};
-use trace::write::write_episodes;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
+use mirrorstats_trace::write::write_episodes;
 
 use crate::harness::program::run;
 use crate::harness::traces;

@@ -6,12 +6,12 @@ use std::error::Error as _;
 use std::fs;
 use std::path::Path;
 
-use metric::definitions::Definitions;
-use metric::file::FileError;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_metric::file::FileError;
+use mirrorstats_score::vocabulary::schema_columns;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
-use score::vocabulary::schema_columns;
 
 fn check(text: &str) -> Result<Definitions, FileError> {
     Definitions::from_toml("test", text, &schema_columns())

@@ -10,13 +10,13 @@ use arrow::array::{
 };
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
 use parquet::arrow::ArrowWriter;
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
-use trace::inputs::Input;
-use trace::open::TraceSet;
 
 /// One file.
 #[derive(Clone, Debug)]

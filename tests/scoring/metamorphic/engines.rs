@@ -7,14 +7,14 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::Command;
 
-use metric::columns::{Column, Columns, Level, Type};
-use metric::definitions::Definitions;
-use metric::sql::{self, Dialect};
-use score::score_traces;
-use score::table::EpisodeTable;
-use score::vocabulary;
+use mirrorstats_metric::columns::{Column, Columns, Level, Type};
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_metric::sql::{self, Dialect};
+use mirrorstats_score::score_traces;
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::vocabulary;
+use mirrorstats_trace::read::open::TraceSet;
 use serde_json::{Value, json};
-use trace::open::TraceSet;
 
 use crate::differential::trace::{Sheet, open};
 use crate::harness::need;

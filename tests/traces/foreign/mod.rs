@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 
 use arrow::util::display::array_value_to_string;
 use mirrorstats::{Study, StudyError};
-use score::format::Format;
-use study::write_scores;
-use trace::checksums::Checksums;
-use trace::diagnostic::Severity;
-use trace::inputs::Input;
-use trace::open::TraceFile;
-use trace::validate::validate;
+use mirrorstats_score::format::Format;
+use mirrorstats_study::write_scores;
+use mirrorstats_trace::diagnostic::Severity;
+use mirrorstats_trace::footers::checksums::Checksums;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceFile;
+use mirrorstats_trace::validate::validate;
 
 use crate::harness::files::{fixture, repository};
 use crate::harness::need;

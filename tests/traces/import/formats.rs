@@ -64,7 +64,7 @@ fn a_csv_column_has_the_type_that_fits_all_cells() {
     assert_eq!(declared["formats"], json!(["csv"]));
     assert_eq!(declared["mapping"]["map"]["t"], "frame+1");
     assert_eq!(declared["mapping"]["set"]["seed"], 1);
-    let hash = exact::hash::of_bytes(rows.as_bytes());
+    let hash = mirrorstats_exact::hash::of_bytes(rows.as_bytes());
     assert_eq!(declared["sources"], json!([hash]), "the hash is that of the file");
 }
 

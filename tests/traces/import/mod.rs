@@ -14,10 +14,10 @@ use std::borrow::Borrow;
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_trace::episodes::identification::VERSION;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceFile;
 use serde_json::{Value, json};
-use trace::identification::VERSION;
-use trace::inputs::Input;
-use trace::open::TraceFile;
 
 use crate::harness::program::run_with_input as run;
 use crate::harness::traces::{score_values, texts};

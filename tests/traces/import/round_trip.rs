@@ -2,9 +2,9 @@
 
 use std::fs;
 
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::write::write_episodes;
 use serde_json::{Map, Value, json};
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::write::write_episodes;
 
 use super::{lines, run, scores};
 use crate::harness::files::fixture;

@@ -4,14 +4,14 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use score::format::{self, Format};
-use score::score_traces::{self, Request};
-use trace::diagnostic::{Code, Finding};
-use trace::error::TraceError;
-use trace::inputs::Input;
-use trace::merge;
-use trace::open::TraceSet;
-use trace::verify::verify_pages;
+use mirrorstats_score::format::{self, Format};
+use mirrorstats_score::score_traces::{self, Request};
+use mirrorstats_trace::diagnostic::{Code, Finding};
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::read::verify::verify_pages;
+use mirrorstats_trace::write::merge;
 
 use crate::harness::files;
 use crate::harness::program::program;
@@ -139,7 +139,7 @@ fn every_reader_finds_every_page_with_a_wrong_checksum() {
             assert_eq!(finding.column.as_ref(), Some(&page.column));
             let merged = merge::read(&path).unwrap_err().to_string();
             assert!(merged.contains("CRC-32") && merged.contains(&page.column), "{name}, {page:?}: {merged}");
-            if trace::schema::column(&page.column).is_none() {
+            if mirrorstats_trace::schema::column(&page.column).is_none() {
                 // A column outside the schema, which `validate` does not read.
                 assert_eq!(page.column, "description");
                 continue;

@@ -5,16 +5,16 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use mirrorstats_trace::diagnostic::Severity;
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::validate::validate;
+use mirrorstats_trace::write::merge;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use trace::diagnostic::Severity;
-use trace::episode::Episode;
-use trace::inputs::Input;
-use trace::merge;
-use trace::validate::validate;
 
 use super::checksums::{draws, scores};
 use super::trace;

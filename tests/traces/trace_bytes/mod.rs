@@ -7,16 +7,16 @@ use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::datatypes::Schema;
+use mirrorstats_trace::diagnostic::Severity;
+use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::scan::Projection;
+use mirrorstats_trace::validate::validate;
+use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 use parquet::arrow::ArrowWriter;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
-use trace::diagnostic::Severity;
-use trace::episode::{Action, Episode, Extra, Step};
-use trace::error::TraceError;
-use trace::inputs::Input;
-use trace::open::TraceSet;
-use trace::scan::Projection;
-use trace::validate::validate;
-use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use crate::harness::traces::{self, reader};
 

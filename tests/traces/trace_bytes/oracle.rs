@@ -12,13 +12,13 @@ use arrow::compute::cast;
 use arrow::datatypes::DataType;
 use arrow::util::display::array_value_to_string;
 use bytes::Bytes;
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::scan::{EpisodeBatch, Projection};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
 use parquet::file::properties::{WriterProperties, WriterVersion};
-use trace::error::TraceError;
-use trace::inputs::Input;
-use trace::open::TraceSet;
-use trace::scan::{EpisodeBatch, Projection};
 
 use crate::trace_bytes::pages::pages;
 use crate::trace_bytes::stored;

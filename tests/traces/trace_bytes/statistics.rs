@@ -4,13 +4,13 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use mirrorstats_trace::diagnostic::{Code, Finding, Severity};
+use mirrorstats_trace::footers::checksums::Checksums;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceFile;
+use mirrorstats_trace::validate::validate;
 use parquet::basic::Compression;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
-use trace::checksums::Checksums;
-use trace::diagnostic::{Code, Finding, Severity};
-use trace::inputs::Input;
-use trace::open::TraceFile;
-use trace::validate::validate;
 
 use super::{stored, trace};
 use crate::harness::program::run;

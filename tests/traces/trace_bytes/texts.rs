@@ -1,8 +1,8 @@
 //! Texts that are valid UTF-8 together but not individually.
 
+use mirrorstats_trace::episodes::episode::{Episode, Extra, Step};
 use parquet::basic::{Compression, Encoding};
 use parquet::file::properties::{WriterProperties, WriterVersion};
-use trace::episode::{Episode, Extra, Step};
 
 use crate::harness::traces;
 use crate::trace_bytes::{read, stored_as, trace_of};

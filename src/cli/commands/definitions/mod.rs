@@ -11,15 +11,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::{Failure, Outcome, output};
-use exact::escape::visible;
-use exact::suggest::nearest;
-use metric::definitions::{Definitions, UnknownMetric};
-use metric::file::{FileError, built_in, built_in_names};
-use score::vocabulary;
-use study::StudyError;
-use toml_spec::FaultRecord;
-use trace::inputs;
-use trace::open::TraceSet;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::suggest::nearest;
+use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
+use mirrorstats_metric::file::{FileError, built_in, built_in_names};
+use mirrorstats_score::vocabulary;
+use mirrorstats_study::StudyError;
+use mirrorstats_toml_spec::FaultRecord;
+use mirrorstats_trace::inputs;
+use mirrorstats_trace::read::open::TraceSet;
 
 /// Check, explain and show metrics, their SQL, their sensitivity
 #[derive(Clone, Debug, clap::Args)]

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
-use exact::replace::Content;
-use report::figures::FigureFormat;
-use study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
+use mirrorstats_exact::replace::Content;
+use mirrorstats_report::figures::FigureFormat;
+use mirrorstats_study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
 
 /// Show how every cell depends on the threshold of mirror evidence, and where a conclusion changes
 ///

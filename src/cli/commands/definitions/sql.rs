@@ -4,9 +4,9 @@ use std::ffi::OsString;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs};
 use crate::cli::{Failure, Outcome, output};
-use metric::sql::{self, Dialect};
-use score::vocabulary::{schema_columns, trace_columns};
-use study::Study;
+use mirrorstats_metric::sql::{self, Dialect};
+use mirrorstats_score::vocabulary::{schema_columns, trace_columns};
+use mirrorstats_study::Study;
 
 /// Print the SQL statement that computes the episode table from a table `steps`
 #[derive(Clone, Debug, clap::Args)]

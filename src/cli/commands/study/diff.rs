@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
-use report::cells::diff::Changes;
-use report::cells::group::DEFAULT_BY;
-use report::changes::Limit;
-use study::{DiffRequest, Side, diff, resolve};
+use mirrorstats_report::cells::diff::Changes;
+use mirrorstats_report::cells::group::DEFAULT_BY;
+use mirrorstats_report::changes::Limit;
+use mirrorstats_study::{DiffRequest, Side, diff, resolve};
 
 /// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
 #[derive(Clone, Debug, clap::Args)]

@@ -6,8 +6,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
-use report::figures::{FigureFormat, FigureName, FigureWidth};
-use study::{FigureOptions, MANY_MODELS};
+use mirrorstats_report::figures::{FigureFormat, FigureName, FigureWidth};
+use mirrorstats_study::{FigureOptions, MANY_MODELS};
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]

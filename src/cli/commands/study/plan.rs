@@ -9,14 +9,14 @@ use crate::cli::commands::world::configured;
 #[cfg(feature = "sim")]
 use crate::cli::registration;
 use crate::cli::{Failure, Outcome, output, terminal};
-use exact::ratio::Ratio;
-use exact::suggest::hint;
-use metric::definitions::Definitions;
-use report::plan::register::{NamedHash, RegisteredPlan};
-use report::plan::{Given, Plan, PlanRequest, plan};
-use score::vocabulary::schema_columns;
-use statistics::sample_size::Clusters;
-use study::StudyError;
+use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_exact::suggest::hint;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_report::plan::{Given, Plan, PlanRequest, plan};
+use mirrorstats_score::vocabulary::schema_columns;
+use mirrorstats_statistics::sample_size::Clusters;
+use mirrorstats_study::StudyError;
 
 /// Plan how many episodes a study needs: for a wanted difference, or the difference that given episodes can show
 #[derive(Clone, Debug, clap::Args)]

@@ -54,7 +54,7 @@ mod rows {
     use super::{Failure, Outcome, QueryArgs};
 
     pub fn answer(_: &QueryArgs) -> Result<Outcome, Failure> {
-        Err(study::StudyError::WithoutPolars.into())
+        Err(mirrorstats_study::StudyError::WithoutPolars.into())
     }
 }
 
@@ -67,13 +67,13 @@ mod rows {
     use super::{AnswerFormat, Failure, Outcome, QueryArgs};
     use crate::cli::args::GroupingArgs;
     use crate::cli::{output, terminal};
-    use engines::polars::answer::{Excerpt, Format, excerpt, write};
-    use engines::polars::run::PolarsError;
-    use engines::polars::shared_file::{WriteError, write_file};
-    use engines::polars::statement;
-    use exact::replace::is_stream;
-    use report::tables::Table as Printed;
-    use study::StudyError;
+    use mirrorstats_engines::polars::answer::{Excerpt, Format, excerpt, write};
+    use mirrorstats_engines::polars::run::PolarsError;
+    use mirrorstats_engines::polars::shared_file::{WriteError, write_file};
+    use mirrorstats_engines::polars::statement;
+    use mirrorstats_exact::replace::is_stream;
+    use mirrorstats_report::tables::Table as Printed;
+    use mirrorstats_study::StudyError;
 
     const NULL: &str = "NULL";
 

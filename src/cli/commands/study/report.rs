@@ -9,9 +9,9 @@ use serde::Serialize;
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::scoring::with_plan;
 use crate::cli::{Failure, Outcome, output};
-use exact::format::counted;
-use report::bundle::Manifest;
-use study::{Report, ReportOptions, WrittenReport};
+use mirrorstats_exact::format::counted;
+use mirrorstats_report::bundle::Manifest;
+use mirrorstats_study::{Report, ReportOptions, WrittenReport};
 
 /// Compute tables and figures of traces: print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]

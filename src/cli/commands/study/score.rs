@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
-use engines::spark::source::is_uri;
-use exact::format::counted;
-use exact::replace::is_stream;
-use score::format::Format;
-use score::table::EpisodeTable;
-use study::{SparkJob, are_uris, write_scores};
+use mirrorstats_engines::spark::source::is_uri;
+use mirrorstats_exact::format::counted;
+use mirrorstats_exact::replace::is_stream;
+use mirrorstats_score::format::Format;
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_study::{SparkJob, are_uris, write_scores};
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]

@@ -9,12 +9,12 @@ use std::sync::Arc;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::{Failure, Outcome, output};
-use exact::escape::visible;
-use study::Question;
-use trace::inputs;
-use trace::labels::check_coder;
-use view::{Options, View, ViewError, export, film, routes};
-use web::{Guard, check_token, new_token};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_study::Question;
+use mirrorstats_trace::episodes::labels::check_coder;
+use mirrorstats_trace::inputs;
+use mirrorstats_view::{Options, View, ViewError, export, film, routes};
+use mirrorstats_web::{Guard, check_token, new_token};
 
 /// Show recordings in the browser: the report, each episode step by step, two episodes side by side
 ///

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use crate::cli::{Failure, Outcome, output, terminal};
-use exact::rounding::Rounding;
-use report::audit::MOST_EPISODES;
-use study::audit_tables;
+use mirrorstats_exact::rounding::Rounding;
+use mirrorstats_report::audit::MOST_EPISODES;
+use mirrorstats_study::audit_tables;
 
 /// Name the cells of published tables whose mean and standard error no data can give
 #[derive(Clone, Debug, clap::Args)]

@@ -7,7 +7,7 @@ pub mod rescore;
 use std::path::PathBuf;
 
 use crate::cli::{Failure, Outcome, output};
-use study::verify::verify;
+use mirrorstats_study::verify::verify;
 
 /// Compare and audit published tables; verify and rescore reports
 #[derive(Debug, clap::Subcommand)]

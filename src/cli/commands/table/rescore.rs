@@ -8,16 +8,16 @@ use serde::Serialize;
 
 use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
-use exact::escape::visible;
-use exact::format::counted;
-use exact::replace::{Content, TemporaryFolder, folder_of};
-use report::bundle::Manifest;
-use report::cells::diff::Changes;
-use report::changes::Limit;
-use report::tables::Table;
-use study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored, traces_of};
-use trace::inputs::Input;
-use world::replay::reparse::{Diverged, ReparseAnswer};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::format::counted;
+use mirrorstats_exact::replace::{Content, TemporaryFolder, folder_of};
+use mirrorstats_report::bundle::Manifest;
+use mirrorstats_report::cells::diff::Changes;
+use mirrorstats_report::changes::Limit;
+use mirrorstats_report::tables::Table;
+use mirrorstats_study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored, traces_of};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_world::replay::reparse::{Diverged, ReparseAnswer};
 
 /// Make a report again from the traces that it was made of, under other definitions or with replies read again
 ///

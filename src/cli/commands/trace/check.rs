@@ -4,11 +4,11 @@ use std::io::{self, Write as _};
 
 use crate::cli::args::{self, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
-use exact::escape::visible;
-use exact::format::fixed;
-use report::layout::quality;
-use score::quality::{CellKey, Quality, QualityByCell};
-use study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::format::fixed;
+use mirrorstats_report::layout::quality;
+use mirrorstats_score::quality::{CellKey, Quality, QualityByCell};
+use mirrorstats_study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///

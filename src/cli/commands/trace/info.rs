@@ -8,15 +8,15 @@ use serde::Serialize;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
-use exact::escape::visible;
-use exact::format::counted;
-use report::layout::quality;
-use report::tables::{Table, wrapped};
-use score::quality::QualityByCell;
-use study::CellAnswer;
-use trace::answered::by_others;
-use trace::checksums::Checksums;
-use trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::format::counted;
+use mirrorstats_report::layout::quality;
+use mirrorstats_report::tables::{Table, wrapped};
+use mirrorstats_score::quality::QualityByCell;
+use mirrorstats_study::CellAnswer;
+use mirrorstats_trace::footers::answered::by_others;
+use mirrorstats_trace::footers::checksums::Checksums;
+use mirrorstats_trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
 
 /// Summarise traces: episodes, steps, models, experiments, coverage, files
 #[derive(Clone, Debug, clap::Args)]

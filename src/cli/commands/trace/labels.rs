@@ -2,9 +2,9 @@
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
-use exact::format::{counted, fixed};
-use report::tables::Table;
-use study::{LabelAgreement, PairAgreement};
+use mirrorstats_exact::format::{counted, fixed};
+use mirrorstats_report::tables::Table;
+use mirrorstats_study::{LabelAgreement, PairAgreement};
 
 const CONFIDENCE: f64 = 0.95;
 

@@ -10,14 +10,14 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::cli::{Failure, Outcome, output};
-use exact::format::counted;
-use trace::diagnostic::Severity;
-use trace::inputs::Input;
-use trace::log::recover::{Losses, recover};
-use trace::merge::{self, EpisodeRows};
-use trace::open::TraceFile;
-use trace::validate::validate;
-use trace::write::OptionalColumns;
+use mirrorstats_exact::format::counted;
+use mirrorstats_trace::diagnostic::Severity;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::log::recover::{Losses, recover};
+use mirrorstats_trace::read::open::TraceFile;
+use mirrorstats_trace::validate::validate;
+use mirrorstats_trace::write::OptionalColumns;
+use mirrorstats_trace::write::merge::{self, EpisodeRows};
 
 /// Make a trace from a log, even a truncated or damaged one
 ///

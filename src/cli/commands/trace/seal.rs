@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output};
-use exact::format::counted;
-use trace::inputs::Input;
-use trace::seal::{SealAnswer, SealError, seal};
+use mirrorstats_exact::format::counted;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::write::seal::{SealAnswer, SealError, seal};
 
 /// Copy a trace with checksums, so that later damage is found
 ///

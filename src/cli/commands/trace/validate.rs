@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::{Failure, Outcome, output};
-use study::{findings, findings_text};
-use trace::answered::by_others;
-use trace::diagnostic::Severity;
-use trace::inputs;
-use trace::open::TraceFile;
+use mirrorstats_study::{findings, findings_text};
+use mirrorstats_trace::diagnostic::Severity;
+use mirrorstats_trace::footers::answered::by_others;
+use mirrorstats_trace::inputs;
+use mirrorstats_trace::read::open::TraceFile;
 
 /// Check traces against every rule of the schema and report every problem
 ///

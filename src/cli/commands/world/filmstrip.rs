@@ -5,9 +5,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
-use report::figures::{Figure, FigureFormat};
-use trace::inputs;
-use world::replay::film_strip::{Steps, Strip};
+use mirrorstats_report::figures::{Figure, FigureFormat};
+use mirrorstats_trace::inputs;
+use mirrorstats_world::replay::film_strip::{Steps, Strip};
 
 /// Draw one episode as a row of frames: what was done and claimed at each, and when the mirror was in view
 ///

@@ -10,11 +10,11 @@ use std::path::PathBuf;
 #[cfg(feature = "raster")]
 use crate::cli::output;
 use crate::cli::{Failure, Outcome, experiments};
-use world::record::plan::Experiments;
-use world::sim::config::{ConfigError, WorldConfig};
+use mirrorstats_world::record::plan::Experiments;
+use mirrorstats_world::sim::config::{ConfigError, WorldConfig};
 #[cfg(feature = "raster")]
-use world::sim::contact_sheet;
-use world::sim::scene::Scene;
+use mirrorstats_world::sim::contact_sheet;
+use mirrorstats_world::sim::scene::Scene;
 
 /// Replay episodes, draw film strips, show scenes
 #[derive(Clone, Debug, clap::Args)]

@@ -1,0 +1,454 @@
+//! The expressions of one SELECT: names, kinds, aggregates and windows. What has no arm here is refused.
+
+use std::sync::Arc;
+
+use polars::prelude::{Expr, NULL, lit, when};
+use sqlparser::ast::{
+    BinaryOperator, CaseWhen, CastKind, CeilFloorKind, DataType, Expr as Ast, Ident, Query, Spanned as _,
+    UnaryOperator, Value as Literal, ValueWithSpan,
+};
+use sqlparser::tokenizer::Span;
+
+use super::accepted::{CASTS, Kind};
+use super::functions::scalar;
+use super::plan::Planner;
+use super::refused::{QueryError, unsupported, wrong};
+use super::relation::{Column, Found, find};
+use super::value::{Value, arithmetic, balanced, common, compare, one_of};
+use super::windows::Window;
+use mirrorstats_exact::suggest::nearest;
+use mirrorstats_metric::syntax::grammar::shortened;
+use mirrorstats_toml_spec::Source;
+
+/// What a column of another type is.
+pub(super) const OTHER: &str = "neither true or false, a number nor a text";
+
+/// Polars plans by recursion.
+const DEEPEST: usize = 100;
+
+/// A key of GROUP BY.
+#[derive(Clone)]
+pub(super) struct Key {
+    pub(super) ast: Ast,
+    /// The key before grouping.
+    pub(super) row: Value,
+    pub(super) grouped: Value,
+}
+
+pub(super) struct Scope<'p, 's> {
+    pub(super) planner: &'p mut Planner<'s>,
+    pub(super) columns: Vec<Column>,
+    /// Columns of a select by their aliases.
+    pub(super) aliases: Vec<(String, Ast)>,
+    pub(super) keys: Option<Vec<Key>>,
+    /// The place where rows are meant and aggregates are not: WHERE, the argument of an aggregate.
+    pub(super) rows_of: Option<&'static str>,
+    /// Columns of rows that aggregates read.
+    pub(super) prepared: Vec<Expr>,
+    pub(super) aggregates: Vec<Expr>,
+    pub(super) windows: Vec<Window>,
+    pub(super) depth: usize,
+}
+
+type Answer<T = Value> = Result<T, QueryError>;
+
+impl<'p, 's> Scope<'p, 's> {
+    pub(super) fn new(planner: &'p mut Planner<'s>, columns: Vec<Column>) -> Self {
+        let (aliases, prepared, aggregates, windows) = Default::default();
+        Self { planner, columns, aliases, keys: None, rows_of: None, prepared, aggregates, windows, depth: 0 }
+    }
+
+    pub(super) fn source(&self) -> &Arc<Source> {
+        self.planner.source
+    }
+
+    pub(super) fn unsupported<T>(&self, ast: &Ast) -> Answer<T> {
+        Err(unsupported(self.source(), ast.span(), format!("`{}`", shortened(&ast.to_string()))))
+    }
+
+    pub(super) fn wrong<T>(&self, span: Span, message: impl Into<String>, help: Option<String>) -> Answer<T> {
+        Err(wrong(self.source(), span, message, help))
+    }
+
+    /// Refuses kinds that do not fit.
+    pub(super) fn unfit<T>(&self, ast: &Ast, values: &[Value]) -> Answer<T> {
+        let kinds = values.iter().map(|value| value.kind.sql()).collect::<Vec<_>>().join(", ");
+        Err(unsupported(self.source(), ast.span(), format!("`{}` of {kinds}", shortened(&ast.to_string()))))
+    }
+
+    /// Runs work in which aggregates are refused.
+    pub(super) fn rows<T>(&mut self, place: &'static str, work: impl FnOnce(&mut Self) -> Answer<T>) -> Answer<T> {
+        let before = self.rows_of.replace(place);
+        let result = work(self);
+        self.rows_of = before;
+        result
+    }
+
+    pub(super) fn value(&mut self, ast: &Ast) -> Answer {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return self.wrong(ast.span(), "the query is nested too deeply", Some("name parts of it with WITH".into()));
+        }
+        let value = self.key(ast).map_or_else(|| self.expression(ast), Ok);
+        self.depth -= 1;
+        value
+    }
+
+    fn key(&self, ast: &Ast) -> Option<Value> {
+        let keys = self.keys.as_ref().filter(|_| self.rows_of.is_none())?;
+        let row = match ast {
+            Ast::Identifier(name) => match find(&self.columns, None, &name.value) {
+                Found::One(column) => Some(column.value()),
+                _ => None,
+            },
+            Ast::CompoundIdentifier(_) => self.compound(ast).ok(),
+            _ => None,
+        };
+        let same = |key: &&Key| &key.ast == ast || row.as_ref().is_some_and(|row| row.expr == key.row.expr);
+        keys.iter().find(same).map(|key| key.grouped.clone())
+    }
+
+    fn expression(&mut self, ast: &Ast) -> Answer {
+        match ast {
+            Ast::Nested(inner) => self.value(inner),
+            Ast::Identifier(name) => self.identifier(ast, name),
+            Ast::CompoundIdentifier(parts) => {
+                let value = self.compound(ast)?;
+                parts.last().map_or_else(|| self.unsupported(ast), |name| self.ungrouped(name, value))
+            }
+            Ast::Value(literal) => self.literal(ast, literal),
+            Ast::BinaryOp { left, op: op @ (BinaryOperator::And | BinaryOperator::Or), right } => {
+                self.chain(left, op, right)
+            }
+            Ast::BinaryOp { left, op, right } => self.binary(ast, left, op, right),
+            Ast::UnaryOp { op, expr } => self.unary(ast, *op, expr),
+            Ast::IsNull(inner) => Ok(Value::bool(self.value(inner)?.expr.is_null())),
+            Ast::IsNotNull(inner) => Ok(Value::bool(self.value(inner)?.expr.is_not_null())),
+            Ast::IsTrue(inner) => self.is(inner, true, false),
+            Ast::IsNotTrue(inner) => self.is(inner, true, true),
+            Ast::IsFalse(inner) => self.is(inner, false, false),
+            Ast::IsNotFalse(inner) => self.is(inner, false, true),
+            Ast::IsUnknown(inner) => Ok(Value::bool(self.truth(inner)?.is_null())),
+            Ast::IsNotUnknown(inner) => Ok(Value::bool(self.truth(inner)?.is_not_null())),
+            Ast::IsDistinctFrom(left, right) => self.distinct(ast, left, right, true),
+            Ast::IsNotDistinctFrom(left, right) => self.distinct(ast, left, right, false),
+            Ast::Between { expr, negated, low, high } => self.between(ast, expr, *negated, [low, high]),
+            Ast::InList { expr, list, negated } => self.in_list(ast, expr, list, *negated),
+            Ast::InSubquery { expr, subquery, negated } => self.in_subquery(ast, expr, subquery, *negated),
+            Ast::Like { negated, any: false, expr, pattern, escape_char: None } => {
+                self.like(ast, expr, pattern, *negated)
+            }
+            Ast::Case { operand, conditions, else_result, .. } => {
+                self.case(ast, operand.as_deref(), conditions, else_result.as_deref())
+            }
+            Ast::Cast { kind: CastKind::Cast | CastKind::DoubleColon, expr, data_type, array: false, format: None } => {
+                self.cast(ast, expr, data_type)
+            }
+            Ast::Ceil { expr, field: CeilFloorKind::DateTimeField(sqlparser::ast::DateTimeField::NoDateTime) } => {
+                self.call(ast, "ceil", &[expr])
+            }
+            Ast::Floor { expr, field: CeilFloorKind::DateTimeField(sqlparser::ast::DateTimeField::NoDateTime) } => {
+                self.call(ast, "floor", &[expr])
+            }
+            Ast::Substring { expr, substring_from: Some(from), substring_for, .. } => {
+                let args: Vec<&Ast> =
+                    [expr.as_ref(), from.as_ref()].into_iter().chain(substring_for.as_deref()).collect();
+                self.call(ast, "substring", &args)
+            }
+            Ast::Trim { trim_where: None, trim_what: None, expr, trim_characters: None } => {
+                self.call(ast, "trim", &[expr])
+            }
+            Ast::Function(function) => self.function(ast, function),
+            Ast::Subquery(query) => self.alone(query, Planner::scalar),
+            Ast::Exists { subquery, negated } => {
+                let exists = self.alone(subquery, Planner::exists)?;
+                Ok(Value::bool(lit(exists != *negated)))
+            }
+            _ => self.unsupported(ast),
+        }
+    }
+
+    /// A subquery in an expression, which runs before the query around it.
+    fn alone<T>(&mut self, query: &Query, run: impl FnOnce(&mut Planner<'s>, &Query) -> Answer<T>) -> Answer<T> {
+        let remedy = "ask with a JOIN or a table of WITH";
+        run(self.planner, query).map_err(|error| match error {
+            QueryError::Faults(mut faults) => {
+                let Some(mut fault) = faults.0.pop() else { return QueryError::Faults(faults) };
+                fault.message = format!("a subquery runs by itself first: {}", fault.message);
+                let named = fault.help.take().map(|help| format!("{help}; or ")).unwrap_or_default();
+                QueryError::Unsupported(Box::new(fault.help(format!("{named}{remedy}"))))
+            }
+            other => other,
+        })
+    }
+
+    fn identifier(&mut self, ast: &Ast, name: &Ident) -> Answer {
+        match find(&self.columns, None, &name.value) {
+            Found::One(column) => {
+                let value = column.value();
+                self.ungrouped(name, value)
+            }
+            Found::Several => self.ambiguous(name),
+            Found::None => {
+                let alias = self.aliases.iter().find(|(alias, _)| alias.eq_ignore_ascii_case(&name.value));
+                match alias.cloned() {
+                    Some((_, meant)) if &meant != ast => self.value(&meant),
+                    _ => self.unknown(name),
+                }
+            }
+        }
+    }
+
+    fn ambiguous<T>(&self, name: &Ident) -> Answer<T> {
+        let tables = self.columns.iter().filter(|column| column.name.eq_ignore_ascii_case(&name.value));
+        let one = |column: &Column| format!("{}.{}", column.table, column.name);
+        let help = format!("write one of {}", tables.map(one).collect::<Vec<_>>().join(", "));
+        self.wrong(name.span, format!("several tables have a column `{}`", name.value), Some(help))
+    }
+
+    fn compound(&self, ast: &Ast) -> Answer {
+        let Ast::CompoundIdentifier(parts) = ast else { return self.unsupported(ast) };
+        let [table, name] = parts.as_slice() else { return self.unsupported(ast) };
+        match find(&self.columns, Some(&table.value), &name.value) {
+            Found::One(column) => Ok(column.value()),
+            Found::Several => self.ambiguous(name),
+            Found::None if self.columns.iter().any(|column| column.table.eq_ignore_ascii_case(&table.value)) => {
+                self.unknown(name)
+            }
+            Found::None => self.wrong(table.span, format!("unknown table `{}`", table.value), None),
+        }
+    }
+
+    fn unknown<T>(&self, name: &Ident) -> Answer<T> {
+        let columns: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
+        let message = format!("unknown column `{}`", name.value);
+        if let Some((span, quoted)) = self.planner.unquoted(name.span, &columns) {
+            let help = format!("write \"{quoted}\" in double quotes: its name is more than letters, digits and `_`");
+            return Err(self.planner.wrong_at(span, message, help));
+        }
+        let near = nearest(&name.value, columns.iter().copied()).map(|near| format!("did you mean `{near}`?"));
+        self.wrong(name.span, message, Some(near.unwrap_or_else(|| format!("columns are {}", columns.join(", ")))))
+    }
+
+    /// Refuses the column of a row where groups are meant.
+    fn ungrouped(&self, name: &Ident, value: Value) -> Answer {
+        if value.kind == Kind::Other {
+            return Err(unsupported(self.source(), name.span, format!("`{}`, which is {OTHER}", name.value)));
+        }
+        match &self.keys {
+            Some(keys) if self.rows_of.is_none() => {
+                let (name, span) = (&name.value, name.span);
+                let without = if keys.is_empty() { "without GROUP BY" } else { "and not in GROUP BY" };
+                let message = format!("the column `{name}` is used beside an aggregate {without}");
+                self.wrong(span, message, Some(format!("add it to GROUP BY, or write max({name})")))
+            }
+            _ => Ok(value),
+        }
+    }
+
+    fn literal(&self, ast: &Ast, literal: &ValueWithSpan) -> Answer {
+        match &literal.value {
+            Literal::Null => Ok(Value::null()),
+            Literal::Boolean(value) => Ok(Value::bool(lit(*value))),
+            Literal::SingleQuotedString(text) => Ok(Value::new(lit(text.clone()), Kind::Text)),
+            Literal::Number(text, false) => self.number(ast, text),
+            _ => self.unsupported(ast),
+        }
+    }
+
+    fn number(&self, ast: &Ast, text: &str) -> Answer {
+        if let Ok(number) = text.parse::<i64>() {
+            return Ok(Value::int(lit(number), 64 - number.leading_zeros()));
+        }
+        let digits = text.chars().filter(char::is_ascii_digit).count();
+        match text.parse::<f64>() {
+            Ok(number) if number.is_finite() && text.contains(['e', 'E']) => Ok(Value::new(lit(number), Kind::Float)),
+            Ok(number) if text.contains('.') && digits <= 15 => {
+                let inexact = (number * 1024.0).fract() != 0.0;
+                Ok(Value { expr: lit(number), kind: Kind::Decimal, bits: inexact.into() })
+            }
+            _ => self.unsupported(ast),
+        }
+    }
+
+    /// A chain of one operator nests as deeply as it is long.
+    fn chain(&mut self, left: &Ast, op: &BinaryOperator, right: &Ast) -> Answer {
+        let (mut parts, mut rest) = (vec![self.truth(right)?], left);
+        while let Ast::BinaryOp { left, op: other, right } = rest {
+            if other != op {
+                break;
+            }
+            parts.push(self.truth(right)?);
+            rest = left;
+        }
+        parts.push(self.truth(rest)?);
+        parts.reverse();
+        let join = if *op == BinaryOperator::And { Expr::and } else { Expr::or };
+        balanced(parts, join).map_or_else(|| self.unsupported(left), |expr| Ok(Value::bool(expr)))
+    }
+
+    pub(super) fn truth(&mut self, ast: &Ast) -> Answer<Expr> {
+        let value = self.value(ast)?;
+        if matches!(value.kind, Kind::Bool | Kind::Null) { Ok(value.to(Kind::Bool)) } else { self.unfit(ast, &[value]) }
+    }
+
+    fn binary(&mut self, ast: &Ast, left: &Ast, op: &BinaryOperator, right: &Ast) -> Answer {
+        use BinaryOperator::{Divide, Eq, Gt, GtEq, Lt, LtEq, Minus, Modulo, Multiply, NotEq, Plus, StringConcat};
+        let [left, right] = [self.value(left)?, self.value(right)?];
+        let value = match op {
+            Plus | Minus | Multiply | Divide | Modulo => arithmetic(&left, op, &right),
+            Eq | NotEq | Lt | LtEq | Gt | GtEq => compare(&left, op, &right),
+            StringConcat if left.kind == Kind::Text && right.kind == Kind::Text => {
+                Some(Value::new(left.expr.clone() + right.expr.clone(), Kind::Text))
+            }
+            _ => None,
+        };
+        value.map_or_else(|| self.unfit(ast, &[left, right]), Ok)
+    }
+
+    fn unary(&mut self, ast: &Ast, op: UnaryOperator, inner: &Ast) -> Answer {
+        if op == UnaryOperator::Not {
+            return Ok(Value::bool(self.truth(inner)?.not()));
+        }
+        let value = self.value(inner)?;
+        match (op, value.kind, &value.expr) {
+            (UnaryOperator::Minus, Kind::Int, _) => {
+                let zero = Value::int(lit(0_i64), 0);
+                arithmetic(&zero, &BinaryOperator::Minus, &value).map_or_else(|| self.unsupported(ast), Ok)
+            }
+            (UnaryOperator::Minus, Kind::Decimal | Kind::Float, _) => {
+                Ok(Value { expr: value.float() * lit(-1.0), ..value })
+            }
+            _ => self.unfit(ast, &[value]),
+        }
+    }
+
+    fn is(&mut self, inner: &Ast, wanted: bool, negated: bool) -> Answer {
+        let truth = self.truth(inner)?;
+        let met = if wanted { truth } else { truth.not() }.fill_null(lit(false));
+        Ok(Value::bool(if negated { met.not() } else { met }))
+    }
+
+    fn distinct(&mut self, ast: &Ast, left: &Ast, right: &Ast, wanted: bool) -> Answer {
+        let values = [self.value(left)?, self.value(right)?];
+        let kind = common(&values).filter(|_| compare(&values[0], &BinaryOperator::Eq, &values[1]).is_some());
+        let Some(kind) = kind else { return self.unfit(ast, &values) };
+        let same = values[0].to(kind).eq_missing(values[1].to(kind));
+        Ok(Value::bool(if wanted { same.not() } else { same }))
+    }
+
+    fn compared(&self, ast: &Ast, left: &Value, op: &BinaryOperator, right: &Value) -> Answer<Expr> {
+        let result = compare(left, op, right).map(|value| value.expr);
+        result.map_or_else(|| self.unfit(ast, &[left.clone(), right.clone()]), Ok)
+    }
+
+    fn between(&mut self, ast: &Ast, expr: &Ast, negated: bool, ends: [&Ast; 2]) -> Answer {
+        let (value, low, high) = (self.value(expr)?, self.value(ends[0])?, self.value(ends[1])?);
+        let from = self.compared(ast, &value, &BinaryOperator::GtEq, &low)?;
+        let inside = from.and(self.compared(ast, &value, &BinaryOperator::LtEq, &high)?);
+        Ok(Value::bool(if negated { inside.not() } else { inside }))
+    }
+
+    fn in_list(&mut self, ast: &Ast, expr: &Ast, list: &[Ast], negated: bool) -> Answer {
+        let value = self.value(expr)?;
+        let mut equal = Vec::new();
+        for item in list {
+            let item = self.value(item)?;
+            equal.push(self.compared(ast, &value, &BinaryOperator::Eq, &item)?);
+        }
+        let any = balanced(equal, Expr::or).unwrap_or_else(|| lit(false));
+        Ok(Value::bool(if negated { any.not() } else { any }))
+    }
+
+    fn in_subquery(&mut self, ast: &Ast, expr: &Ast, query: &Query, negated: bool) -> Answer {
+        let value = self.value(expr)?;
+        let (items, found) = self.alone(query, Planner::column)?;
+        let kind = common([&value, &items]).filter(|_| compare(&value, &BinaryOperator::Eq, &items).is_some());
+        let Some(kind) = kind else { return self.unfit(ast, &[value, items]) };
+        if found.is_empty() {
+            return Ok(Value::bool(lit(negated)));
+        }
+        let has_null = found.null_count() > 0;
+        let known = found.drop_nulls().strict_cast(&kind.wide()).map_err(super::run::PolarsError::from)?;
+        let inside = value.to(kind).is_in(lit(known).implode(false), false);
+        // Beside a null, a value that is not in the list is unknown.
+        let inside = if has_null { when(inside).then(lit(true)).otherwise(lit(NULL)) } else { inside };
+        Ok(Value::bool(if negated { inside.not() } else { inside }))
+    }
+
+    fn like(&mut self, ast: &Ast, expr: &Ast, pattern: &Ast, negated: bool) -> Answer {
+        let value = self.value(expr)?;
+        let Ast::Value(ValueWithSpan { value: Literal::SingleQuotedString(pattern), .. }) = pattern else {
+            return self.unsupported(ast);
+        };
+        if value.kind != Kind::Text {
+            return self.unfit(ast, &[value]);
+        }
+        let part = |character: char| match character {
+            '%' => ".*".to_owned(),
+            '_' => ".".to_owned(),
+            // Every sign may stand escaped in a class of one.
+            '^' | '\\' => format!("\\{character}"),
+            _ if character.is_ascii_punctuation() => format!("[\\{character}]"),
+            other => other.to_string(),
+        };
+        let regex = format!("(?s)^{}$", pattern.chars().map(part).collect::<String>());
+        let met = value.expr.str().contains(lit(regex), true);
+        Ok(Value::bool(if negated { met.not() } else { met }))
+    }
+
+    fn case(&mut self, ast: &Ast, operand: Option<&Ast>, whens: &[CaseWhen], otherwise: Option<&Ast>) -> Answer {
+        let operand = operand.map(|operand| self.value(operand)).transpose()?;
+        let (mut conditions, mut results) = (Vec::new(), Vec::new());
+        for one in whens {
+            conditions.push(match &operand {
+                None => self.truth(&one.condition)?,
+                Some(operand) => {
+                    let value = self.value(&one.condition)?;
+                    self.compared(ast, operand, &BinaryOperator::Eq, &value)?
+                }
+            });
+            results.push(self.value(&one.result)?);
+        }
+        results.push(otherwise.map_or_else(|| Ok(Value::null()), |value| self.value(value))?);
+        let Some(kind) = common(&results) else { return self.unfit(ast, &results) };
+        let last = results.last().map_or_else(|| lit(NULL), |value| value.to(kind));
+        let chain = conditions.into_iter().zip(&results).rev();
+        let expr = chain.fold(last, |rest, (met, value)| {
+            // A null condition is not met.
+            when(met.fill_null(lit(false))).then(value.to(kind)).otherwise(rest)
+        });
+        Ok(one_of(expr, kind, &results))
+    }
+
+    fn cast(&mut self, ast: &Ast, inner: &Ast, ty: &DataType) -> Answer {
+        let value = self.value(inner)?;
+        let target = match ty {
+            DataType::Boolean | DataType::Bool => "BOOLEAN",
+            DataType::Int(None) | DataType::Integer(None) | DataType::Int4(None) => "INTEGER",
+            DataType::BigInt(None) | DataType::Int8(None) => "BIGINT",
+            DataType::Double(_) | DataType::DoublePrecision | DataType::Float8 => "DOUBLE",
+            DataType::Text | DataType::Varchar(None) | DataType::String(None) => "VARCHAR",
+            _ => return self.unfit(ast, &[value]),
+        };
+        let accepted = CASTS.iter().any(|(kind, targets)| *kind == value.kind && targets.contains(&target));
+        let small = value.kind == Kind::Int && target == "INTEGER" && value.bits <= 31;
+        if !accepted && !small {
+            return self.unfit(ast, &[value]);
+        }
+        Ok(match (value.kind, target) {
+            (Kind::Bool, "INTEGER" | "BIGINT") => Value::int(value.to(Kind::Int), 1),
+            (_, "INTEGER" | "BIGINT") => Value::int(value.to(Kind::Int), value.bits),
+            (_, "DOUBLE") => Value::new(value.float(), Kind::Float),
+            (_, "BOOLEAN") => value,
+            _ => Value::new(value.to(Kind::Text), Kind::Text),
+        })
+    }
+
+    /// A scalar function.
+    pub(super) fn call(&mut self, ast: &Ast, name: &str, args: &[&Ast]) -> Answer {
+        let values = args.iter().map(|arg| self.value(arg)).collect::<Result<Vec<_>, _>>()?;
+        let Some(numbers) = super::windows::fitting(name, args, &values) else { return self.unfit(ast, &values) };
+        scalar(name, &values, &numbers).map_or_else(|| self.unfit(ast, &values), Ok)
+    }
+}

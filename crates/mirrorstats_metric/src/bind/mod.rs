@@ -1,0 +1,210 @@
+//! Binds names to columns, checks types and levels, and builds one shared plan.
+//!
+//! Every definition is bound once, on demand, so definitions may be in any order. A definition that refers to itself is
+//! refused with the path of references. A fault in one definition does not hide faults of others: definitions that
+//! depend on a faulty one are skipped without a message.
+
+mod calls;
+mod scope;
+mod types;
+mod values;
+
+use std::collections::HashMap;
+
+use indexmap::IndexMap;
+
+use self::scope::Scope;
+use super::columns::{Columns, Level, Type};
+use super::file::{Document, MetricEntry};
+use super::logical_plan::plan::{Builder, NodeId, Op, Plan};
+use super::syntax;
+use crate::catalogs::catalog::Kind;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_toml_spec::{Fault, Written};
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bound {
+    pub(super) node: NodeId,
+    /// `None` is the literal null, which has every type.
+    pub(super) ty: Option<Type>,
+    pub(super) level: Level,
+    /// True for a metric with a truth value, which counts as 0 or 1 where a number is needed.
+    pub(super) rate: bool,
+}
+
+#[derive(Debug)]
+pub(super) struct Binding {
+    pub(super) plan: Plan,
+    pub(super) metrics: IndexMap<String, (NodeId, Kind)>,
+    pub(super) lets: Vec<(String, NodeId)>,
+    pub(super) filter: Option<NodeId>,
+}
+
+pub(super) fn bind(document: &Document, columns: &Columns, filter: Option<&Written>) -> Result<Binding, Vec<Fault>> {
+    let mut binder = Binder {
+        document,
+        columns,
+        builder: Builder::default(),
+        states: HashMap::new(),
+        underway: Vec::new(),
+        depth: 0,
+        faults: Vec::new(),
+    };
+    binder.check_names();
+    let lets = document.lets.keys().filter_map(|name| Some((name.clone(), binder.definition(name)?.node))).collect();
+    let mut metrics = IndexMap::new();
+    for name in document.metrics.keys() {
+        if let Some(bound) = binder.definition(name) {
+            let declared = document.metrics[name].said.unit.as_deref() == Some("rate");
+            let kind = if bound.rate || declared { Kind::Rate } else { Kind::Quantity };
+            metrics.insert(name.clone(), (bound.node, kind));
+        }
+    }
+    let filter = filter.and_then(|written| binder.condition(written, "a filter of episodes"));
+    let filter = filter.map(|bound| bound.node);
+    if binder.faults.is_empty() {
+        Ok(Binding { plan: binder.builder.finish(), metrics, lets, filter })
+    } else {
+        Err(binder.faults)
+    }
+}
+
+enum State {
+    Underway,
+    Done(Bound),
+    Faulty,
+}
+
+struct Binder<'a> {
+    document: &'a Document,
+    columns: &'a Columns,
+    builder: Builder,
+    states: HashMap<String, State>,
+    underway: Vec<String>,
+    depth: usize,
+    faults: Vec<Fault>,
+}
+
+/// The deepest nesting across definitions; bounds the stack.
+const DEEPEST: usize = 400;
+
+impl Binder<'_> {
+    /// Each name has one meaning. A column outside the schema gives way to a definition of its name, so that definitions
+    /// mean the same whatever else was recorded.
+    fn check_names(&mut self) {
+        let document = self.document;
+        let lets = document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
+        let metrics = document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));
+        for (name, place, what) in lets.chain(metrics) {
+            let is_column = self.columns.is_reserved(name) || document.columns.contains_key(name);
+            if name.is_empty() || name.contains(|c: char| c == ',' || c.is_control()) {
+                let message = format!("`{}` is no name of a {}", visible(name), what.trim_matches('`'));
+                self.faults.push(Fault::new(place.clone(), message).help("a name has visible characters and no comma"));
+            } else if name == "t" || is_column {
+                let message = format!("the {what} `{name}` has the name of a column");
+                self.faults.push(Fault::new(place.clone(), message).help("choose another name"));
+            } else if what == "metric" && document.lets.contains_key(name) {
+                let message = format!("`{name}` is a `let` and a metric");
+                self.faults.push(Fault::new(place.clone(), message).help("choose another name for one of them"));
+            }
+        }
+    }
+
+    fn definition(&mut self, name: &str) -> Option<Bound> {
+        match self.states.get(name) {
+            Some(State::Done(bound)) => return Some(*bound),
+            Some(State::Faulty | State::Underway) => return None,
+            None => {}
+        }
+        self.states.insert(name.to_owned(), State::Underway);
+        self.underway.push(name.to_owned());
+        let document = self.document;
+        let bound = match (document.lets.get(name), document.metrics.get(name)) {
+            (Some((written, _)), _) => self.written(written),
+            (None, Some(entry)) => self.metric(entry),
+            (None, None) => None,
+        };
+        self.underway.pop();
+        self.states.insert(name.to_owned(), bound.map_or(State::Faulty, State::Done));
+        bound
+    }
+
+    fn written(&mut self, written: &Written) -> Option<Bound> {
+        match syntax::parse(&written.text) {
+            Ok(expr) => Scope { binder: self, written }.bind(&expr),
+            Err(faults) => {
+                for fault in faults {
+                    self.faults.push(Fault::new(written.place(fault.span), fault.message).help_if(fault.help));
+                }
+                None
+            }
+        }
+    }
+
+    fn metric(&mut self, entry: &MetricEntry) -> Option<Bound> {
+        let when = entry.when.as_ref().map(|written| self.condition(written, "`when`"));
+        let value = self.written(&entry.value).and_then(|bound| self.metric_value(bound, &entry.value));
+        let (when, value) = (when.map_or(Some(None), |when| when.map(Some))?, value?);
+        let Some(when) = when else { return Some(value) };
+        let ty = value.ty?;
+        let branches = vec![(when.node, self.spread(value.node, ty, value.level, Level::Episode))];
+        let node = self.builder.add(Op::Case { branches, otherwise: None }, ty, Level::Episode);
+        Some(Bound { node, level: Level::Episode, ..value })
+    }
+
+    fn metric_value(&mut self, bound: Bound, written: &Written) -> Option<Bound> {
+        let place = written.everywhere();
+        if bound.level == Level::Step {
+            let fault = Fault::new(place, "a metric has one value per episode, this has one per step");
+            let help =
+                "lead down to the episode with any(), all(), count(), first(), last(), at(), min(), max() or sum()";
+            return self.refuse(fault.label("one value per step").help(help));
+        }
+        match bound.ty {
+            Some(Type::Bool) => {
+                Some(Bound { rate: true, node: self.at_episode(bound), level: Level::Episode, ..bound })
+            }
+            Some(Type::Int) => Some(Bound { node: self.at_episode(bound), level: Level::Episode, ..bound }),
+            Some(ty @ (Type::Float | Type::Text)) => {
+                let fault =
+                    Fault::new(place, format!("a metric is an integer or true or false, this is {}", ty.name()));
+                let help = "sums of integers are exact in any order; compare, count, or scale to an integer column";
+                self.refuse(fault.label(ty.name()).help(help))
+            }
+            None => self.refuse(Fault::new(place, "a metric that is always null is never defined")),
+        }
+    }
+
+    fn condition(&mut self, written: &Written, what: &str) -> Option<Bound> {
+        let bound = self.written(written)?;
+        let place = written.everywhere();
+        if bound.level == Level::Step {
+            let fault = Fault::new(place, format!("{what} is decided once per episode, this has one value per step"));
+            return self.refuse(fault.label("one value per step").help("wrap it: any(...) or all(...)"));
+        }
+        match bound.ty {
+            Some(Type::Bool) => Some(Bound { node: self.at_episode(bound), level: Level::Episode, ..bound }),
+            ty => {
+                let found = ty.map_or("null", Type::name);
+                let fault = Fault::new(place, format!("{what} must be true or false, this is {found}"));
+                self.refuse(fault.label(found))
+            }
+        }
+    }
+
+    fn at_episode(&mut self, bound: Bound) -> NodeId {
+        match bound.ty {
+            Some(ty) => self.spread(bound.node, ty, bound.level, Level::Episode),
+            None => bound.node,
+        }
+    }
+
+    fn spread(&mut self, node: NodeId, ty: Type, from: Level, to: Level) -> NodeId {
+        if from >= to { node } else { self.builder.add(Op::Spread(node), ty, to) }
+    }
+
+    fn refuse<T>(&mut self, fault: Fault) -> Option<T> {
+        self.faults.push(fault);
+        None
+    }
+}

@@ -1,0 +1,224 @@
+//! Definition files as written: parses TOML, checks every key, and reports faults with their places.
+//!
+//! This file knows the keys of a definition file, which `shape` declares, but not the meaning of expressions.
+
+use std::path::Path;
+
+use indexmap::IndexMap;
+
+use super::catalogs::catalog::{Control, Factor};
+use super::columns::{Column, Level};
+use super::shape::{DefinitionFile, ExperimentShape, MetricShape};
+use crate::columns::Type;
+use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::hash;
+use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_exact::suggest::nearest;
+use mirrorstats_toml_spec::{At, Fault, Faults, FileKind, FileText, Part, Place, Source, Written};
+
+/// Definitions are written by hand, or by a program that spells out many similar metrics.
+const KIND: FileKind = FileKind {
+    name: "definition file",
+    names: "definitions",
+    check: "mirrorstats definitions check FILE",
+    built_in: &[
+        ("paper", include_str!("../../../assets/definitions/paper.toml")),
+        ("extended", include_str!("../../../assets/definitions/extended.toml")),
+        ("battery", include_str!("../../../assets/definitions/battery.toml")),
+        ("evidence", include_str!("../../../assets/definitions/evidence.toml")),
+        ("reach", include_str!("../../../assets/definitions/reach.toml")),
+        ("reach-fallback", include_str!("../../../assets/definitions/reach-fallback.toml")),
+    ],
+    largest: Limit::new("bytes of a definition file", 1 << 20),
+    most_keys: Limit::new("keys in a definition file", 10_000),
+    most_includes: Limit::new("includes, those of included files counted", 256),
+};
+
+/// The domain of definitions that name none: the columns and rules of the mirror are known.
+const MIRROR: &str = "mirror";
+
+/// A definition file and its includes, merged in order: later entries replace earlier ones.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    pub name: String,
+    /// SHA-256 of the file's text; absent for built-in texts and texts without a file.
+    pub file_hash: Option<String>,
+    pub built_on: Vec<&'static str>,
+    pub open: bool,
+    /// The subject of the traces, any name; absent for the mirror.
+    pub domain: Option<String>,
+    pub columns: IndexMap<String, ColumnEntry>,
+    pub lets: IndexMap<String, (Written, Place)>,
+    pub metrics: IndexMap<String, MetricEntry>,
+    pub experiments: IndexMap<String, ExperimentEntry>,
+    /// `[factor.NAME]` tables, with the places of the experiments in `values`.
+    pub factors: IndexMap<String, (Factor, Vec<Place>)>,
+}
+
+/// A `[column.NAME]` table.
+#[derive(Clone, Debug)]
+pub struct ColumnEntry {
+    pub place: Place,
+    pub column: Column,
+    /// The only texts in it, except null; any if empty.
+    pub values: Vec<String>,
+    pub unit: String,
+    pub help: String,
+}
+
+/// A `[metric.NAME]` table.
+#[derive(Clone, Debug)]
+pub struct MetricEntry {
+    pub place: Place,
+    pub said: MetricShape,
+    pub value: Written,
+    pub when: Option<Written>,
+    pub chance: Option<Ratio>,
+    pub finished: Place,
+    pub completes: Place,
+}
+
+/// An `[experiment.NAME]` table.
+#[derive(Clone, Debug)]
+pub struct ExperimentEntry {
+    pub title: String,
+    /// `order`; the position in the file if absent.
+    pub order: Option<i64>,
+    pub chance: IndexMap<String, (Option<Ratio>, Place)>,
+    pub reference: IndexMap<String, (Vec<Ratio>, Place)>,
+    /// `control`, with the places of its experiment and of its metrics.
+    pub control: Option<(Control, Place, Vec<Place>)>,
+}
+
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    #[error("cannot read the definition file `{path}`; {}", KIND.did_you_mean(path))]
+    Unreadable { path: String, source: std::io::Error },
+    #[error(transparent)]
+    Faults(#[from] Faults),
+}
+
+pub fn built_in_names() -> Vec<&'static str> {
+    KIND.built_in_names()
+}
+
+pub fn built_in(name: &str) -> Option<&'static str> {
+    KIND.built_in_text(name)
+}
+
+pub fn read(name_or_path: impl AsRef<Path>) -> Result<Document, FileError> {
+    let path = name_or_path.as_ref();
+    let unreadable = |source| FileError::Unreadable { path: path.display().to_string(), source };
+    let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    document(name, KIND.open(path, path).map_err(unreadable)?)
+}
+
+/// Reads definitions from a text; includes are relative to `folder`, the current one if absent.
+pub(crate) fn read_source(name: String, source: Source, folder: Option<&Path>) -> Result<Document, FileError> {
+    document(name, FileText::inline(source, folder))
+}
+
+fn document(name: String, file: FileText) -> Result<Document, FileError> {
+    let file_hash = file.path.is_some().then(|| hash::of_bytes(file.source.text.as_bytes()));
+    let mut document = Document { name, file_hash, ..Document::default() };
+    KIND.read(file, |at, part, faults| document.add(at, part, faults))?;
+    Ok(document)
+}
+
+impl Document {
+    pub fn unknown_metric(&self, name: &str, place: &Place) -> Option<Fault> {
+        unknown(&self.metrics, "metric", name, place)
+    }
+
+    pub(super) fn unknown_experiment(&self, name: &str, place: &Place) -> Option<Fault> {
+        unknown(&self.experiments, "experiment", name, place)
+    }
+
+    pub(super) fn not_controlled(&self, own: &str, name: &str, place: &Place) -> Option<Fault> {
+        if name == own {
+            return Some(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
+        }
+        self.unknown_experiment(name, place)
+    }
+
+    fn add(&mut self, at: &At<'_>, part: &Part, faults: &mut Vec<Fault>) {
+        self.built_on.extend(part.built_in);
+        let Some(file) = mirrorstats_toml_spec::read::<DefinitionFile>(at, "a definition file", faults) else { return };
+        self.open = file.open.unwrap_or(self.open);
+        if let Some(domain) = file.domain {
+            self.domain = Some(domain).filter(|name| name != MIRROR);
+        }
+        for (name, at) in at.within("let") {
+            self.lets.insert(name.to_owned(), (at.expression(), at.name_place()));
+        }
+        for ((name, said), (_, at)) in file.column.into_iter().zip(at.within("column")) {
+            if said.ty != Type::Text && !said.values.is_empty() {
+                let fault = at.key("values").item(0).fault("`values` lists the texts of a column that is not text");
+                faults.push(fault.help("give the column `type = \"text\"`, or leave the list out"));
+            }
+            let level = if said.constant { Level::Episode } else { Level::Step };
+            let column = Column { ty: said.ty, level };
+            let entry =
+                ColumnEntry { place: at.name_place(), column, values: said.values, unit: said.unit, help: said.help };
+            self.columns.insert(name, entry);
+        }
+        for ((name, said), (_, at)) in file.experiment.into_iter().zip(at.within("experiment")) {
+            self.experiments.insert(name, ExperimentEntry::new(said, &at, faults));
+        }
+        for ((name, said), (_, at)) in file.factor.into_iter().zip(at.within("factor")) {
+            let places = at.within("values").map(|(_, at)| at.name_place()).collect();
+            self.factors.insert(name, (said, places));
+        }
+        for ((name, said), (_, at)) in file.metric.into_iter().zip(at.within("metric")) {
+            self.metrics.insert(name, MetricEntry::new(said, &at, faults));
+        }
+    }
+}
+
+fn unknown<T>(known: &IndexMap<String, T>, noun: &str, name: &str, place: &Place) -> Option<Fault> {
+    if known.contains_key(name) {
+        return None;
+    }
+    let near = nearest(name, known.keys().map(String::as_str));
+    let fault = Fault::new(place.clone(), format!("`{name}` is no {noun} of these definitions"));
+    Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
+}
+
+impl MetricEntry {
+    fn new(said: MetricShape, at: &At<'_>, faults: &mut Vec<Fault>) -> Self {
+        Self {
+            place: at.name_place(),
+            value: at.key("value").expression(),
+            when: at.get("when").map(|when| when.expression()),
+            chance: at.get("chance").and_then(|level| level.parse(faults)),
+            finished: at.key("finished").place(),
+            completes: at.key("completes").place(),
+            said,
+        }
+    }
+
+    pub(super) fn relations(&self) -> impl Iterator<Item = (&'static str, &str, &Place)> {
+        let finished = self.said.finished.iter().map(|name| ("finished", name.as_str(), &self.finished));
+        finished.chain(self.said.completes.iter().map(|name| ("completes", name.as_str(), &self.completes)))
+    }
+}
+
+impl ExperimentEntry {
+    fn new(said: ExperimentShape, at: &At<'_>, faults: &mut Vec<Fault>) -> Self {
+        let chance = at.within("chance").filter_map(|(metric, at)| {
+            let level = if at.written() == "none" { None } else { Some(at.parse(faults)?) };
+            Some((metric.to_owned(), (level, at.name_place())))
+        });
+        let chance = chance.collect();
+        let reference = at.within("reference").map(|(metric, at)| {
+            let levels = at.items().filter_map(|level| level.parse(faults)).collect();
+            (metric.to_owned(), (levels, at.name_place()))
+        });
+        let places = |at: &At<'_>| (at.key("of").place(), at.within("on").map(|(_, at)| at.place()).collect());
+        let control = said.control.zip(at.get("control")).map(|(control, at)| {
+            let (of, on) = places(&at);
+            (control, of, on)
+        });
+        Self { title: said.title, order: said.order, chance, reference: reference.collect(), control }
+    }
+}

@@ -1,0 +1,211 @@
+//! The table of data quality: reply quality by experiment, model and condition, for people and in full.
+//!
+//! Rule: unrecorded values print as `--`, never as zero.
+
+use std::collections::BTreeMap;
+
+use crate::cells::KeyValue;
+use crate::tables::{Column, ListTable, Look, Table, key_field};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::format::fixed;
+use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, statuses};
+
+const NAME: &str = "quality";
+const UNKNOWN: &str = "--";
+/// The shares of replies whose latency is reported.
+const MEDIAN: f64 = 0.5;
+const SLOW: f64 = 0.95;
+const NANO: f64 = 1e9;
+
+/// Data quality by experiment, model and condition; `None` without cells.
+pub fn of_cells(cells: &QualityByCell) -> Option<ListTable> {
+    let keys = if cells.has_conditions() { 3 } else { 2 };
+    let table = || ListTable { name: NAME.to_owned(), printed: printed(cells, keys), records: records(cells, keys) };
+    (!cells.0.is_empty()).then(table)
+}
+
+/// The table for a terminal, without title and notes; empty without cells.
+pub fn text(cells: &QualityByCell, width: Option<usize>) -> String {
+    of_cells(cells).map_or_else(String::new, |table| table.printed.lines(width))
+}
+
+fn keys_and<'a>(keys: usize, others: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
+    ["experiment", "model", "condition"].into_iter().take(keys).chain(others)
+}
+
+fn printed(cells: &QualityByCell, keys: usize) -> Table {
+    let header =
+        ["episodes", "lost", "steps", "no decision", "reasons", "repaired", "latency, ms", "tokens", "cost, USD"];
+    let table = Table {
+        title: "Data quality".to_owned(),
+        sentences: notes(cells),
+        label: Some("tab:quality".to_owned()),
+        ..Table::list(Look::Ruled, keys, keys_and(keys, header).map(Column::left))
+    };
+    table.with(cells.0.iter().map(|(key, quality)| row(key, quality, keys)))
+}
+
+fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
+    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys).cloned();
+    let recorded = quality.replies() > 0;
+    let if_recorded = |text: String| if recorded { text } else { UNKNOWN.to_owned() };
+    names
+        .chain([
+            quality.episodes.to_string(),
+            quality.lost.map_or_else(|| UNKNOWN.to_owned(), |lost| lost.to_string()),
+            quality.steps.to_string(),
+            if_recorded(share(quality.unusable(), quality.replies())),
+            if_recorded(listed(quality.unread())),
+            if_recorded(repaired(quality)),
+            latency(quality),
+            tokens(quality),
+            cost(quality),
+        ])
+        .collect()
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a share for people")]
+fn share(count: u64, all: u64) -> String {
+    let percent = 100.0 * count as f64 / all as f64;
+    format!("{count}/{all} ({} %)", fixed(Some(percent), 1))
+}
+
+/// `refusal 4, truncated 2`; empty without any.
+fn listed<'a>(counts: impl Iterator<Item = (&'a String, &'a u64)>) -> String {
+    counts.map(|(name, count)| format!("{} {count}", visible(name))).collect::<Vec<_>>().join(", ")
+}
+
+fn repaired(quality: &Quality) -> String {
+    let count = quality.of_status("repaired");
+    if quality.repairs.is_empty() { count.to_string() } else { format!("{count}: {}", listed(quality.repairs.iter())) }
+}
+
+fn latency(quality: &Quality) -> String {
+    match (quality.latency(MEDIAN), quality.latency(SLOW)) {
+        (Some(median), Some(slow)) => format!("{median}; 95 % within {slow}"),
+        _ => UNKNOWN.to_owned(),
+    }
+}
+
+fn tokens(quality: &Quality) -> String {
+    match (quality.prompt_tokens.mean(), quality.completion_tokens.mean()) {
+        (None, None) => UNKNOWN.to_owned(),
+        (prompt, completion) => format!("{} + {}", fixed(prompt, 0), fixed(completion, 0)),
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a cost for people")]
+fn cost(quality: &Quality) -> String {
+    let total = quality.cost_nano_usd;
+    if total.replies == 0 { UNKNOWN.to_owned() } else { fixed(Some(total.sum as f64 / NANO), 4) }
+}
+
+fn notes(cells: &QualityByCell) -> Vec<String> {
+    let mut notes =
+        vec!["Replies without a decision and their reasons; repairs that made a reply readable.".to_owned()];
+    if cells.0.values().any(|quality| quality.prompt_tokens.replies > 0) {
+        notes.push("Tokens per request and per reply.".to_owned());
+    }
+    if !cells.is_recorded() {
+        notes.push(format!("The traces do not record how replies came ({UNKNOWN})."));
+    }
+    notes
+}
+
+fn records(cells: &QualityByCell, keys: usize) -> Table {
+    let tail = [
+        "unusable",
+        "other_status",
+        "repairs",
+        "latency_median_ms",
+        "latency_95_ms",
+        "prompt_tokens",
+        "completion_tokens",
+        "cost_usd",
+    ];
+    let header = ["episodes", "lost", "steps", "replies"].into_iter().chain(statuses().iter().copied()).chain(tail);
+    let table = Table::of_texts(keys_and(keys, header));
+    table.with(cells.0.iter().map(|(key, quality)| record(key, quality, keys)))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "nine decimal places of a cost")]
+fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
+    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys);
+    let names = names.map(|name| key_field(&KeyValue::Text(name.clone())));
+    let recorded = quality.replies() > 0;
+    let count = |count: u64| if recorded { count.to_string() } else { String::new() };
+    let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
+    let total = |replies: u64, sum: String| if replies > 0 { sum } else { String::new() };
+    let known: u64 = statuses().iter().map(|status| quality.of_status(status)).sum();
+    let repairs: BTreeMap<_, _> = quality.repairs.iter().collect();
+    let repairs = repairs.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join("; ");
+    let Quality { prompt_tokens, completion_tokens, cost_nano_usd, .. } = quality;
+    names
+        .chain([
+            quality.episodes.to_string(),
+            quality.lost.map_or_else(String::new, |lost| lost.to_string()),
+            quality.steps.to_string(),
+            count(quality.replies()),
+        ])
+        .chain(statuses().iter().map(|status| count(quality.of_status(status))))
+        .chain([
+            count(quality.unusable()),
+            count(quality.replies() - known),
+            repairs,
+            optional(quality.latency(MEDIAN)),
+            optional(quality.latency(SLOW)),
+            total(prompt_tokens.replies, prompt_tokens.sum.to_string()),
+            total(completion_tokens.replies, completion_tokens.sum.to_string()),
+            total(cost_nano_usd.replies, fixed(Some(cost_nano_usd.sum as f64 / NANO), 9)),
+        ])
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::of_cells;
+    use crate::tables::ListTable;
+    use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, Total};
+
+    fn cells(condition: &str) -> QualityByCell {
+        let key = |model: &str| CellKey { experiment: "E1".into(), model: model.into(), condition: condition.into() };
+        let told = Quality {
+            episodes: 2,
+            steps: 40,
+            lost: Some(1),
+            statuses: [("ok".to_owned(), 30), ("repaired".to_owned(), 6), ("refusal".to_owned(), 4)].into(),
+            repairs: [("fence".to_owned(), 5), ("case".to_owned(), 2)].into(),
+            faults: [].into(),
+            by_episode: [].into(),
+            latencies: [(100, 30), (900, 10)].into(),
+            prompt_tokens: Total { replies: 40, sum: 48_000 },
+            completion_tokens: Total { replies: 40, sum: 3_240 },
+            cost_nano_usd: Total { replies: 40, sum: 12_345_678 },
+        };
+        let untold = Quality { episodes: 1, steps: 7, ..Quality::default() };
+        QualityByCell([(key("=m"), told), (key("n_1"), untold)].into())
+    }
+
+    #[test]
+    fn unrecorded_quality_is_not_zero() {
+        let table = of_cells(&cells("default")).unwrap().printed;
+        let rows: Vec<Vec<&str>> =
+            table.rows().map(|row| row.iter().map(|cell| cell.text.as_str()).collect()).collect();
+        assert_eq!(rows[1][2..], ["1", "--", "7", "--", "--", "--", "--", "--", "--"]);
+        assert_eq!(rows[0][5..8], ["4/40 (10.0 %)", "refusal 4", "6: case 2, fence 5"]);
+        assert_eq!(rows[0][8..], ["100; 95 % within 900", "1200 + 81", "0.0123"]);
+        assert!(of_cells(&QualityByCell::default()).is_none());
+    }
+
+    #[test]
+    fn every_format_escapes_its_names() {
+        let ListTable { printed, records, .. } = of_cells(&cells("near")).unwrap();
+        insta::assert_snapshot!(records.csv(), @r"
+        experiment,model,condition,episodes,lost,steps,replies,ok,repaired,parse_failed,schema_invalid,refusal,truncated,empty,rate_limited,server_error,timeout,unusable,other_status,repairs,latency_median_ms,latency_95_ms,prompt_tokens,completion_tokens,cost_usd
+        E1,'=m,near,2,1,40,40,30,6,0,0,4,0,0,0,0,0,4,0,case 2; fence 5,100,900,48000,3240,0.012345678
+        E1,n_1,near,1,,7,,,,,,,,,,,,,,,,,,,
+        ");
+        assert!(printed.latex().contains(r"n\_1 & near & 1 & "), "{}", printed.latex());
+        assert!(printed.markdown().contains("| E1 | n\\_1 | near |"), "{}", printed.markdown());
+    }
+}

@@ -1,0 +1,392 @@
+//! One block minus another under one metric: paired if they have pairs, else as independent samples.
+
+use std::collections::BTreeSet;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::durations::{decided, is_duration};
+use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::matching::{Matched, Sides, Units, outcomes};
+use crate::statistics::retest::repeat_variance;
+use crate::study::{Block, Study, Unit};
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::{Kind, StandardError};
+use mirrorstats_score::tables::table::MetricColumn;
+use mirrorstats_statistics::comparisons::holm::level;
+use mirrorstats_statistics::comparisons::paired::Pairs;
+use mirrorstats_statistics::comparisons::units;
+use mirrorstats_statistics::comparisons::unpaired::{fisher, newcombe, welch};
+use mirrorstats_statistics::durations::competing::{Ending, Outcome};
+use mirrorstats_statistics::durations::restricted::{
+    Difference, by_units, fewest, independent, paired, shared_horizon,
+};
+use mirrorstats_statistics::intervals::coverage::{self, Withheld};
+use mirrorstats_statistics::intervals::interval::{Interval, student_t};
+use mirrorstats_statistics::outcomes::ExactTest;
+
+/// The test of a difference, and the method of its interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Pairs of a rate: the exact test of `McNemar`, Newcombe's interval for pairs.
+    #[default]
+    Mcnemar,
+    /// Independent rates: Fisher's exact test, Newcombe's hybrid score interval.
+    Fisher,
+    /// Pairs of a duration: restricted means, Student's t interval and test of their difference.
+    RestrictedMeanPaired,
+    /// Independent durations: the same with Satterthwaite's degrees of freedom.
+    RestrictedMean,
+    /// Pairs of another quantity: Student's t interval of the differences; no test.
+    StudentPaired,
+    /// Independent samples of another quantity: Welch's t interval; no test.
+    Welch,
+    /// Rates of scenes, seeds or participants with several episodes, or of which some are pairs: the exact permutation
+    /// test within shared units and among the others; no interval.
+    Units,
+}
+
+/// The first minus the second.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Comparison {
+    /// The test and the interval.
+    pub method: Method,
+    /// The episodes compared: of each side those in which the metric is defined; of pairs, those defined in both.
+    pub n: [u64; 2],
+    /// The successes among them; none for quantities.
+    pub successes: Option<[u64; 2]>,
+    /// The 2x2 table; none if the samples are independent.
+    pub pairs: Option<Pairs>,
+    /// Pairs left out because the metric is undefined in one episode or both.
+    pub undefined: u64,
+    /// The horizon of restricted means, in steps.
+    pub horizon: Option<i64>,
+    /// The first mean minus the second, over the episodes compared.
+    pub difference: Option<f64>,
+    /// Its interval, not adjusted for the number of comparisons.
+    pub interval: Option<Interval>,
+    /// The reason why there is no interval.
+    pub withheld: Option<Withheld>,
+    /// The standard error from repeats alone: by how much the difference of means varies if the same scenes are played
+    /// again; none unless both sides repeat scenes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeat_se: Option<f64>,
+    /// The p value, two-sided: exact and by minimum likelihood for rates, by Student's t for durations.
+    pub p: Option<f64>,
+    /// The mid-p value of a rate, which is not guaranteed to keep the level.
+    pub mid_p: Option<f64>,
+    /// `p` adjusted by Holm's method over the family.
+    pub p_adjusted: Option<f64>,
+    /// True if the value adjusted by Holm reaches the level of significance.
+    pub separated: bool,
+    /// The units of analysis of both sides where the test counts each once, however many episodes it has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// The test with the lost episodes of both sides; none if none was lost.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
+    /// The setting in which the two sides were recorded differently, so that nothing is compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomparable: Option<String>,
+}
+
+pub(crate) struct Compared<'s, 'a> {
+    pub study: &'s Study<'a>,
+    pub first: &'s Block<'a>,
+    pub second: &'s Block<'a>,
+    pub matched: &'s Matched,
+    pub horizon: Option<i64>,
+    pub confidence: f64,
+}
+
+impl Compared<'_, '_> {
+    /// The comparison under one metric, before adjustment.
+    pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
+        let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
+        let found = self.assuming(None, column, sides.as_ref());
+        let lost = if found.p.is_some() { self.lost() } else { 0 };
+        let losses = LossCases::of(lost, |toward| {
+            let Comparison { difference, p, .. } = self.assuming(Some(toward), column, sides.as_ref());
+            LossCase { difference, p }
+        });
+        let noise = |block| repeat_variance(self.study, block, column);
+        let repeat_se = noise(self.first).zip(noise(self.second)).map(|(a, b)| (a + b).sqrt());
+        Comparison { repeat_se, losses, ..found }
+    }
+
+    /// The comparison without the lost episodes of both sides, or with them. In a comparison by pairs or units, each
+    /// lost episode is a pair against a known outcome, which is its largest possible effect.
+    fn assuming(&self, lost: Option<Toward>, column: &MetricColumn, sides: Option<&Sides>) -> Comparison {
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        match sides {
+            Some(sides) if rates => self.rates_by_unit(lost, column, sides),
+            _ if !rates && self.is_dependent() => self.quantity_by_unit(lost, column),
+            _ => self.of_episodes(lost, column),
+        }
+    }
+
+    fn lost(&self) -> u64 {
+        self.first.lost + self.second.lost
+    }
+
+    fn moments(&self, lost: Option<Toward>, column: &MetricColumn) -> [Moments; 2] {
+        [(self.first, true), (self.second, false)]
+            .map(|(block, is_first)| Toward::assumed(lost, block, column, is_first))
+    }
+
+    /// Returns true if a unit occurs more than once in the comparison of episodes.
+    fn is_dependent(&self) -> bool {
+        let Some(pairs) = &self.matched.pairs else {
+            return self.first.repeats || self.second.repeats;
+        };
+        let units: BTreeSet<Unit> = pairs.iter().map(|&(row, _)| self.study.unit(row)).collect();
+        units.len() < pairs.len()
+    }
+
+    fn rates_by_unit(&self, lost: Option<Toward>, column: &MetricColumn, sides: &Sides) -> Comparison {
+        let [a, b] = self.moments(lost, column);
+        let test = sides.test(&lost.map_or_else(Vec::new, |toward| toward.units(self.lost())));
+        let least = test.map_or(1.0, |test| test.least);
+        let pairs = self.matched.pairs.as_ref().filter(|_| !self.is_dependent());
+        Comparison {
+            successes: a.counts().zip(b.counts()).map(|(a, b)| [a.0, b.0]),
+            difference: a.mean().zip(b.mean()).map(|(a, b)| a - b),
+            withheld: Some(Withheld::Dependent),
+            pairs: pairs.map(|rows| outcomes(column, rows)),
+            p: test.map(|test| test.p),
+            units: Some(Units::between(self.study, [self.first, self.second], sides, least, self.confidence)),
+            ..Comparison::of(Method::Units, [a.n, b.n])
+        }
+    }
+
+    /// Compares a duration by unit if all its times up to the horizon are known; other quantities have no test.
+    fn quantity_by_unit(&self, lost: Option<Toward>, column: &MetricColumn) -> Comparison {
+        let seen = self.of_episodes(None, column);
+        let seen = Comparison { interval: None, withheld: Some(Withheld::Dependent), p: None, ..seen };
+        if !is_duration(self.study, &column.name) {
+            return seen;
+        }
+        let rows = || [self.first, self.second].into_iter().flat_map(Block::rows);
+        let Some(horizon) = seen.horizon else { return seen };
+        let unknown = |row: &usize| {
+            let end = decided(self.study, column, *row);
+            end.is_some_and(|end| end.outcome == Outcome::Unfinished && end.steps < horizon)
+        };
+        let unknown = rows().filter(unknown).count() as u64;
+        if unknown > 0 {
+            let units = Units { n: unknown, name: "interrupted episodes".to_owned(), too_few: true };
+            return Comparison { units: Some(units), ..seen };
+        }
+        let time = |row| decided(self.study, column, row).map(|end| end.steps.min(horizon));
+        let times = Sides::by(self.study, &[(self.first, self.second)], time).divided();
+        let Some(mut sides) = times else { return seen };
+        if let Some(toward) = lost {
+            self.add_lost(&mut sides, horizon, toward);
+        }
+        let is_paired = !sides.shared.is_empty();
+        let n = if is_paired { sides.shared.len() } else { sides.first.len().min(sides.second.len()) };
+        let found = by_units(&sides, horizon, self.confidence);
+        let least = if (n as u64) < fewest_of(self.confidence) { 1.0 } else { 0.0 };
+        let units = Units::new(self.study, self.first, n, least, self.confidence);
+        let method = if is_paired { Method::RestrictedMeanPaired } else { Method::RestrictedMean };
+        let tested = Comparison::of_durations(method, [n as u64; 2], found, self.confidence);
+        Comparison { n: seen.n, units: Some(units), ..tested }
+    }
+
+    /// Adds each lost episode as its own unit, decided at once or never.
+    fn add_lost(&self, sides: &mut units::Sides, horizon: i64, toward: Toward) {
+        let one = |steps: i64| Moments::default().with(steps).unwrap_or_default();
+        let [first, second] = toward.ends([1, horizon]).map(one);
+        if sides.shared.is_empty() {
+            sides.first.extend((0..self.first.lost).map(|_| first));
+            sides.second.extend((0..self.second.lost).map(|_| second));
+        } else {
+            sides.shared.extend((0..self.lost()).map(|_| (first, second)));
+        }
+    }
+
+    fn of_episodes(&self, lost: Option<Toward>, column: &MetricColumn) -> Comparison {
+        if is_duration(self.study, &column.name) {
+            return self.durations(lost, column);
+        }
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        match &self.matched.pairs {
+            Some(pairs) if rates => self.paired_rate(lost, column, pairs),
+            Some(pairs) => self.paired_quantity(column, pairs),
+            None => self.independent(lost, column, rates),
+        }
+    }
+
+    fn paired_rate(&self, lost: Option<Toward>, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
+        let seen = outcomes(column, rows);
+        let pairs = lost.map_or(seen, |toward| toward.pairs(seen, self.lost()));
+        Comparison {
+            successes: Some([pairs.both + pairs.first_only, pairs.both + pairs.second_only]),
+            pairs: Some(pairs),
+            undefined: rows.len() as u64 - seen.n(),
+            difference: pairs.difference(),
+            interval: pairs.interval(self.confidence),
+            ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(pairs.test())
+        }
+    }
+
+    fn paired_quantity(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
+        let mut differences = rows.iter().filter_map(|&(a, b)| column.get(a)?.checked_sub(column.get(b)?));
+        // If a sum of squares exceeds 128 bits, there is no interval.
+        let moments = differences.try_fold(Moments::default(), Moments::with).unwrap_or_default();
+        let interval = student_t(&moments, StandardError::Sample, self.confidence);
+        let spread = moments.se(StandardError::Sample).is_some_and(|se| se > 0.0);
+        let (interval, withheld) = coverage::given(interval, moments.n, coverage::STUDENT, spread);
+        Comparison {
+            undefined: rows.len() as u64 - moments.n,
+            difference: moments.mean(),
+            interval,
+            withheld,
+            ..Comparison::of(Method::StudentPaired, [moments.n; 2])
+        }
+    }
+
+    fn independent(&self, lost: Option<Toward>, column: &MetricColumn, rates: bool) -> Comparison {
+        let [a, b] = self.moments(lost.filter(|_| rates), column);
+        let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
+        let counted = rates.then(|| a.counts().zip(b.counts())).flatten();
+        if let Some((first, second)) = counted {
+            return Comparison {
+                successes: Some([first.0, second.0]),
+                difference,
+                interval: newcombe(first, second, self.confidence),
+                ..Comparison::of(Method::Fisher, [a.n, b.n]).tested(fisher(first, second))
+            };
+        }
+        let spread = [a, b].iter().any(|side| side.se(StandardError::Sample).is_some_and(|se| se > 0.0));
+        let (interval, withheld) =
+            coverage::given(welch(&a, &b, self.confidence), a.n.min(b.n), coverage::WELCH, spread);
+        Comparison { difference, interval, withheld, ..Comparison::of(Method::Welch, [a.n, b.n]) }
+    }
+
+    fn durations(&self, lost: Option<Toward>, column: &MetricColumn) -> Comparison {
+        let mut sides = self.endings(column);
+        let (method, undefined) = match &self.matched.pairs {
+            Some(pairs) => (Method::RestrictedMeanPaired, (pairs.len() - sides[0].len()) as u64),
+            None => (Method::RestrictedMean, 0),
+        };
+        let horizon = self.horizon.or_else(|| shared_horizon(&sides[0], &sides[1]));
+        if let Some((toward, horizon)) = lost.zip(horizon) {
+            // Decided at once or never.
+            let [fast, slow] = [(1, Outcome::Correct), (horizon, Outcome::Unfinished)];
+            let ends = toward.ends([fast, slow]).map(|(steps, outcome)| Ending { steps, outcome });
+            let is_paired = self.matched.pairs.is_some();
+            let counts = if is_paired { [self.lost(); 2] } else { [self.first.lost, self.second.lost] };
+            for ((side, end), count) in sides.iter_mut().zip(ends).zip(counts) {
+                side.extend((0..count).map(|_| end));
+            }
+        }
+        let found = horizon.and_then(|horizon| self.restricted(&sides, horizon));
+        let n = sides.map(|side| side.len() as u64);
+        Comparison { undefined, ..Comparison::of_durations(method, n, found, self.confidence) }
+    }
+
+    /// The endings of both sides' episodes. For pairs, only those with both endings, in the same order.
+    fn endings(&self, column: &MetricColumn) -> [Vec<Ending>; 2] {
+        let ending = |row: usize| decided(self.study, column, row);
+        match &self.matched.pairs {
+            Some(pairs) => pairs.iter().filter_map(|&(a, b)| ending(a).zip(ending(b))).unzip().into(),
+            None => [self.first, self.second].map(|block| block.rows().filter_map(ending).collect()),
+        }
+    }
+
+    fn restricted(&self, [first, second]: &[Vec<Ending>; 2], horizon: i64) -> Option<Difference> {
+        if self.matched.pairs.is_none() {
+            return independent(first, second, horizon, self.confidence);
+        }
+        let pairs: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
+        paired(&pairs, horizon, self.confidence)
+    }
+}
+
+impl Comparison {
+    fn of(method: Method, n: [u64; 2]) -> Self {
+        Self { method, n, ..Self::default() }
+    }
+
+    pub(crate) fn unless(self, incomparable: Option<String>) -> Self {
+        if incomparable.is_none() {
+            return self;
+        }
+        let Self { method, n, successes, .. } = self;
+        Self { successes, withheld: Some(Withheld::Incomparable), incomparable, ..Self::of(method, n) }
+    }
+
+    /// The test needs as many units as any other test, the interval as many as its coverage requires.
+    fn of_durations(method: Method, n: [u64; 2], found: Option<Difference>, confidence: f64) -> Self {
+        let least = fewest_of(confidence);
+        let (interval, withheld) = coverage::given(
+            found.and_then(|found| found.interval),
+            n[0].min(n[1]),
+            coverage::DIFFERENCE,
+            found.is_none_or(|found| found.p.is_some()),
+        );
+        Self {
+            horizon: found.map(|found| found.horizon),
+            difference: found.map(|found| found.difference),
+            interval,
+            withheld,
+            p: found.and_then(|found| found.p).filter(|_| n[0].min(n[1]) >= least),
+            ..Self::of(method, n)
+        }
+    }
+
+    fn tested(self, test: Option<ExactTest>) -> Self {
+        Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), ..self }
+    }
+
+    /// The units, pairs or episodes that are too few for a verdict, or the lost episodes that decide it; else `None`.
+    pub(crate) fn unsaid(&self, confidence: f64) -> Option<Units> {
+        if let Some(units) = &self.units {
+            return units.too_few.then(|| units.clone()).or_else(|| LossCases::unsettled(self.losses.as_ref()));
+        }
+        let [m, n] = self.n;
+        let (least, name) = match self.method {
+            Method::Mcnemar => (0.5f64.powf(m as f64 - 1.0), "pairs"),
+            Method::Fisher => {
+                let divisions: f64 = (1..=m.min(n)).map(|k| (m.max(n) + k) as f64 / k as f64).product();
+                (if m == n { 2.0 / divisions } else { 1.0 / divisions }, "episodes")
+            }
+            Method::RestrictedMeanPaired | Method::RestrictedMean if m.min(n) < fewest_of(confidence) => {
+                (f64::INFINITY, if self.method == Method::RestrictedMean { "episodes" } else { "pairs" })
+            }
+            _ => return LossCases::unsettled(self.losses.as_ref()),
+        };
+        let is_hopeless =
+            (self.p.is_some() || least == f64::INFINITY) && level(confidence).is_some_and(|level| least > level);
+        let hopeless = is_hopeless.then(|| Units { n: m.min(n), name: name.to_owned(), too_few: true });
+        hopeless.or_else(|| LossCases::unsettled(self.losses.as_ref()))
+    }
+
+    /// The sign of a shown difference; `None` if no difference is shown.
+    pub fn sign(&self) -> Option<Sign> {
+        let difference = self.difference.filter(|_| self.separated)?;
+        Some(if difference > 0.0 { Sign::Higher } else { Sign::Lower })
+    }
+}
+
+fn fewest_of(confidence: f64) -> u64 {
+    level(confidence).map_or(u64::MAX, |level| fewest(level) as u64)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    Higher,
+    Lower,
+}
+
+pub(crate) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
+    let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
+    let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };
+    let settled = settle(tested.iter_mut().map(|it| (seen(it), &mut it.losses)), confidence);
+    for (comparison, (p, is_shown)) in tested.into_iter().zip(settled) {
+        comparison.p_adjusted = Some(p);
+        comparison.separated = is_shown && !comparison.units.as_ref().is_some_and(|units| units.too_few);
+    }
+}

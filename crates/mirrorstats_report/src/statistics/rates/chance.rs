@@ -1,0 +1,220 @@
+//! Rates against the levels of blind guessing, by the exact binomial test.
+//!
+//! Rule: a rate that counts unfinished episodes as failures is beside the same rate among finished episodes
+//! ([`Relations`](mirrorstats_metric::catalogs::relations::Relations)): a model that never finishes is below chance, but need not guess.
+
+use std::cmp::Ordering;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::matching::{Units, too_few};
+use crate::study::{Block, Experiment, RowKey, Study};
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_score::tables::table::MetricColumn;
+use mirrorstats_statistics::chance::{exact_test, least_p};
+use mirrorstats_statistics::comparisons::holm::level;
+use mirrorstats_statistics::comparisons::units::rate_test;
+
+/// One rate against one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChanceRow {
+    #[serde(flatten)]
+    pub key: RowKey,
+    /// The metric.
+    pub metric: String,
+    /// The role of the level.
+    pub role: Role,
+    /// The level.
+    pub level: Ratio,
+    /// The successes.
+    pub successes: u64,
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+    /// The exact p value, two-sided by minimum likelihood.
+    pub p: f64,
+    /// The mid-p value, which is not guaranteed to keep the level.
+    pub mid_p: f64,
+    /// `p` adjusted by Holm's method over the models of the experiment, against this level.
+    pub p_adjusted: f64,
+    /// The verdict of the Holm-adjusted value at the level of significance.
+    pub verdict: Verdict,
+    /// The units of analysis where some have several episodes: the test counts each once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// The test with the lost episodes of the model; none if it lost none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
+}
+
+/// The role of a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// The rate of blind guessing.
+    Chance,
+    /// The result of some blind strategy, where no chance level applies.
+    Reference,
+}
+
+impl Role {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Chance => "chance",
+            Self::Reference => "reference",
+        }
+    }
+}
+
+/// The position of a rate relative to a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Shown to be above.
+    Above,
+    /// Shown to be below.
+    Below,
+    /// Not shown to differ.
+    NotSeparated,
+}
+
+impl ChanceRow {
+    /// Every rate against every level of its experiment.
+    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+        let mut rows = Vec::new();
+        for experiment in &study.experiments {
+            for column in study.rates() {
+                for level in levels(study, experiment.name, &column.name) {
+                    rows.extend(Self::family(study, experiment, column, level, confidence));
+                }
+            }
+        }
+        rows
+    }
+
+    fn family(
+        study: &Study,
+        experiment: &Experiment,
+        column: &MetricColumn,
+        (role, chance): (Role, Ratio),
+        confidence: f64,
+    ) -> Vec<Self> {
+        let of = |block: &Block| Self::of(study, block, column, (role, chance), confidence);
+        let (seen, mut rows): (Vec<LossCase>, Vec<Self>) = experiment.blocks.iter().filter_map(of).unzip();
+        let settled = settle(seen.into_iter().zip(rows.iter_mut().map(|row| &mut row.losses)), confidence);
+        for (row, (p_adjusted, is_shown)) in rows.iter_mut().zip(settled) {
+            let units = row.units.as_ref().map(|units| units.too_few);
+            let too_few = units.unwrap_or_else(|| few_episodes(row.n, chance, confidence));
+            row.p_adjusted = p_adjusted;
+            row.verdict = Verdict::of(row.successes, row.n, chance, is_shown && !too_few);
+        }
+        rows
+    }
+
+    /// One rate of one block, before adjustment.
+    fn of(
+        study: &Study,
+        block: &Block,
+        column: &MetricColumn,
+        (role, chance): (Role, Ratio),
+        confidence: f64,
+    ) -> Option<(LossCase, Self)> {
+        let (successes, n) = block.moments(column).counts()?;
+        let of_units: Option<Vec<Moments>> =
+            block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
+        let with_lost = |toward| Toward::assumed(toward, block, column, true);
+        let tested = |toward: Option<Toward>| {
+            let Some(units) = &of_units else {
+                let (successes, n) = with_lost(toward).counts()?;
+                return Some((exact_test(successes, n, chance)?, least_p(n, chance)?));
+            };
+            let lost = toward.map_or_else(Vec::new, |toward| toward.units(block.lost));
+            let lost = lost.into_iter().map(|(one, _)| one);
+            rate_test(&units.iter().copied().chain(lost).collect::<Vec<_>>(), chance)
+        };
+        let case = |toward| LossCase {
+            difference: with_lost(toward).mean().map(|mean| mean - chance.value()),
+            p: tested(toward).map(|(test, _)| test.p),
+        };
+        let (test, least) = tested(None)?;
+        let row = Self {
+            key: block.key(),
+            metric: column.name.clone(),
+            role,
+            level: chance,
+            successes,
+            n,
+            p: test.p,
+            mid_p: test.mid_p,
+            p_adjusted: test.p,
+            verdict: Verdict::NotSeparated,
+            units: of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence)),
+            losses: LossCases::of(block.lost, |toward| case(Some(toward))),
+        };
+        Some((case(None), row))
+    }
+
+    /// The units or episodes that are too few for a verdict, or the lost ones that decide it; otherwise `None`.
+    pub(crate) fn unsaid(&self, confidence: f64) -> Option<Units> {
+        let episodes =
+            || Units { n: self.n, name: "episodes".to_owned(), too_few: few_episodes(self.n, self.level, confidence) };
+        let units = self.units.clone().unwrap_or_else(episodes);
+        units.too_few.then_some(units).or_else(|| LossCases::unsettled(self.losses.as_ref()))
+    }
+
+    /// The largest number of units or episodes, if no outcome of these models could pass Holm's first step.
+    pub(crate) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
+        let first_step = level(confidence)? / family.len() as f64;
+        let counted =
+            |row: &Self| row.units.clone().unwrap_or(Units { n: row.n, name: "episodes".to_owned(), too_few: true });
+        let is_hopeless = |row: &&Self| least_p(counted(row).n, row.level).is_none_or(|least| least > first_step);
+        let most = family.iter().map(|row| counted(row)).max_by_key(|units| units.n)?;
+        family.iter().all(is_hopeless).then_some(most)
+    }
+}
+
+fn few_episodes(n: u64, level: Ratio, confidence: f64) -> bool {
+    least_p(n, level).is_none_or(|least| too_few(usize::try_from(n).unwrap_or(usize::MAX), least, confidence))
+}
+
+impl Verdict {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Above => "above",
+            Self::Below => "below",
+            Self::NotSeparated => "not told apart",
+        }
+    }
+
+    pub(crate) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
+        let seen = i128::from(successes) * i128::from(level.denominator());
+        let expected = i128::from(level.numerator()) * i128::from(n);
+        Self::by_order(seen.cmp(&expected), is_shown)
+    }
+
+    pub(crate) fn by_order(order: Ordering, is_shown: bool) -> Self {
+        match order {
+            Ordering::Greater if is_shown => Self::Above,
+            Ordering::Less if is_shown => Self::Below,
+            _ => Self::NotSeparated,
+        }
+    }
+}
+
+pub(crate) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+    let own = own_levels(study, experiment, metric);
+    match study.relations.whole(metric) {
+        Some(whole) if own.is_empty() => own_levels(study, experiment, whole),
+        _ => own,
+    }
+}
+
+pub(crate) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+    let catalog = &study.table.catalog;
+    let chance = catalog.chance(experiment, metric).map(|level| (Role::Chance, level));
+    let references = catalog.experiment.get(experiment).and_then(|known| known.reference.get(metric));
+    let references = references.into_iter().flatten().map(|&level| (Role::Reference, level));
+    chance.into_iter().chain(references).collect()
+}

@@ -1,0 +1,58 @@
+//! Errors of scoring: of a batch, and of traces.
+
+use arrow::error::ArrowError;
+
+use super::tables::declared_experiments::DeclarationError;
+use mirrorstats_exact::budget::Exceeded;
+use mirrorstats_metric::catalogs::restore::RestoreError;
+use mirrorstats_metric::definitions::UnknownMetric;
+use mirrorstats_metric::file::FileError;
+use mirrorstats_toml_spec::Faults;
+use mirrorstats_trace::error::TraceError;
+
+#[derive(Debug, thiserror::Error)]
+pub enum EngineError {
+    #[error(transparent)]
+    Exceeded(#[from] Exceeded),
+    #[error("the column `{0}` is not in the batch; project every column of the plan")]
+    MissingColumn(String),
+    #[error(
+        "the column `{column}` has the type {found}; expected booleans, 64-bit integers, doubles or a dictionary of text"
+    )]
+    ColumnType { column: String, found: String },
+    #[error("`{metric}` overflows 64-bit integers: {reason}; use smaller numbers in its definition")]
+    Overflow { metric: String, reason: String },
+    #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 for each episode")]
+    NotARate { metric: String, value: i64 },
+}
+
+#[derive(Debug, thiserror::Error)]
+pub enum ScoreError {
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    #[error(transparent)]
+    Definitions(#[from] FileError),
+    #[error(transparent)]
+    Carried(#[from] RestoreError),
+    #[error(transparent)]
+    Declaration(#[from] DeclarationError),
+    #[error(transparent)]
+    Condition(#[from] Faults),
+    #[error(transparent)]
+    Metric(#[from] UnknownMetric),
+    #[error("`{wanted_by}` reads the column `{column}`: {problem}; {help}")]
+    Column { wanted_by: String, column: String, problem: String, help: String },
+    #[error("cannot group by `{name}`: expected a column that is constant in an episode, one of {}; {help}", .known.join(", "))]
+    Label { name: String, known: Vec<String>, help: String },
+    #[error("{file}: {source}")]
+    Engine { file: String, source: EngineError },
+}
+
+/// An error of evaluating a step: the step's own, or a kernel's, whose metric is determined later.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum StepError {
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    #[error(transparent)]
+    Kernel(#[from] ArrowError),
+}

@@ -1,0 +1,240 @@
+//! From the logical plan to steps.
+
+use std::collections::HashMap;
+
+use super::window::{beside_its_episode, computes_after_lookup, is_leaf, split, window};
+use super::{Kernel, PhysicalPlan, Shape, StepId};
+use mirrorstats_metric::columns::{Level, Type};
+use mirrorstats_metric::logical_plan::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan};
+
+pub(super) struct Lowering<'a> {
+    physical: &'a mut PhysicalPlan,
+    plan: &'a Plan,
+    known: HashMap<(NodeId, Option<StepId>), StepId>,
+    metrics: HashMap<NodeId, &'a str>,
+}
+
+impl<'a> Lowering<'a> {
+    pub(super) fn new(physical: &'a mut PhysicalPlan, plan: &'a Plan) -> Self {
+        let mut metrics = HashMap::new();
+        for output in &plan.outputs {
+            for node in plan.needed_by([output.node]) {
+                metrics.entry(node).or_insert(output.name.as_str());
+            }
+        }
+        Self { physical, plan, known: HashMap::new(), metrics }
+    }
+
+    pub(super) fn values(&mut self, id: NodeId) -> StepId {
+        self.plain(id, None)
+    }
+
+    /// Lowers a node at its own level, per timestep or per episode. With `at`, gives its value at the moments of that
+    /// step, per episode.
+    fn node(&mut self, id: NodeId, at: Option<StepId>) -> StepId {
+        if let Some(known) = self.known.get(&(id, at)) {
+            return *known;
+        }
+        let step = match at {
+            Some(moments) if is_leaf(self.plan, id) => self.leaf_at(id, moments),
+            _ => self.operation(id, at),
+        };
+        self.known.insert((id, at), step);
+        step
+    }
+
+    fn leaf_at(&mut self, id: NodeId, moments: StepId) -> StepId {
+        let values = self.node(id, None);
+        match self.physical.step(values).shape {
+            Shape::Timesteps => self.at(values, moments),
+            Shape::One | Shape::Episodes => values,
+        }
+    }
+
+    fn at(&mut self, values: StepId, moments: StepId) -> StepId {
+        let ty = self.physical.step(values).ty;
+        self.physical.push(Kernel::At { values, moments }, ty, Shape::Episodes)
+    }
+
+    fn operation(&mut self, id: NodeId, at: Option<StepId>) -> StepId {
+        let plan = self.plan;
+        let node = plan.node(id);
+        let shape = match node.level {
+            Level::Constant => Shape::One,
+            Level::Episode => Shape::Episodes,
+            Level::Step if at.is_some() => Shape::Episodes,
+            Level::Step => Shape::Timesteps,
+        };
+        let kernel = match (&node.op, at) {
+            (Op::Time, Some(moments)) => return moments,
+            (Op::Spread(x), _) => return self.spread(*x, shape, at),
+            (Op::Compare(comparison, x, y), _) => self.compare(&node.op, *comparison, (*x, *y), at),
+            (Op::Aggregate(aggregate, x), _) => self.aggregate(*aggregate, *x),
+            (Op::At(x, moment), _) => return self.lookup(*x, *moment),
+            (Op::Lag(x), _) => Kernel::Lag(self.full(*x, Shape::Timesteps, None)),
+            (Op::Case { branches, otherwise }, _) => self.case(branches, *otherwise, node.ty, shape, at),
+            (op, _) => self.elementwise(op, shape, at),
+        };
+        let step = self.physical.push(kernel, node.ty, shape);
+        if let Some(metric) = self.metrics.get(&id) {
+            self.physical.metrics.entry(step).or_insert_with(|| (*metric).to_owned());
+        }
+        step
+    }
+
+    fn elementwise(&mut self, op: &Op, shape: Shape, at: Option<StepId>) -> Kernel {
+        match op {
+            Op::Column(name) => Kernel::Column(name.clone()),
+            Op::Constant(constant) => Kernel::Constant(constant.clone()),
+            Op::Time => Kernel::Times,
+            Op::Length => Kernel::Lengths,
+            Op::Not(x) => Kernel::Not(self.node(*x, at)),
+            Op::And(x, y) => Kernel::And(self.full(*x, shape, at), self.full(*y, shape, at)),
+            Op::Or(x, y) => Kernel::Or(self.full(*x, shape, at), self.full(*y, shape, at)),
+            Op::Distinct(x, y) => Kernel::Distinct(self.plain(*x, at), self.plain(*y, at)),
+            Op::IsNull(x) => Kernel::IsNull(self.node(*x, at)),
+            Op::IsTrue(x) => Kernel::IsTrue(self.node(*x, at)),
+            Op::IsFalse(x) => Kernel::IsFalse(self.node(*x, at)),
+            Op::Arithmetic(op @ (Arithmetic::Quotient | Arithmetic::Remainder), x, y) => {
+                Kernel::Divide(*op, self.full(*x, shape, at), self.full(*y, shape, at))
+            }
+            Op::Arithmetic(op, x, y) => Kernel::Arithmetic(*op, self.node(*x, at), self.node(*y, at)),
+            Op::Negate(x) => Kernel::Negate(self.node(*x, at)),
+            Op::Coalesce(values) => Kernel::Coalesce(values.iter().map(|id| self.full(*id, shape, at)).collect()),
+            Op::Matches(x, pattern) => self.matches(*x, pattern, at),
+            Op::IntFromBool(x) => Kernel::IntFromBool(self.node(*x, at)),
+            Op::FloatFromInt(x) => Kernel::FloatFromInt(self.node(*x, at)),
+            Op::Spread(_) | Op::Compare(..) | Op::Case { .. } | Op::Aggregate(..) | Op::At(..) | Op::Lag(_) => {
+                unreachable!("these have functions of their own")
+            }
+        }
+    }
+
+    fn plain(&mut self, id: NodeId, at: Option<StepId>) -> StepId {
+        let step = self.node(id, at);
+        if !self.gives_keys(step) {
+            return step;
+        }
+        let shape = self.physical.step(step).shape;
+        self.physical.push(Kernel::Symbols(step), Type::Text, shape)
+    }
+
+    fn full(&mut self, id: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
+        let step = self.plain(id, at);
+        self.written_out(step, shape)
+    }
+
+    fn written_out(&mut self, step: StepId, shape: Shape) -> StepId {
+        match self.physical.step(step) {
+            of if of.shape == Shape::One => {
+                let ty = of.ty;
+                self.physical.push(Kernel::Repeat(step), ty, shape)
+            }
+            _ => step,
+        }
+    }
+
+    fn gives_keys(&self, step: StepId) -> bool {
+        let step = self.physical.step(step);
+        step.ty == Type::Text && matches!(step.kernel, Kernel::Column(_))
+    }
+
+    fn spread(&mut self, x: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
+        let values = self.plain(x, at);
+        let ty = self.physical.step(values).ty;
+        match self.physical.step(values).shape {
+            Shape::One => self.physical.push(Kernel::Repeat(values), ty, shape),
+            from if from == shape => values,
+            _ => self.physical.push(Kernel::Spread(values), ty, shape),
+        }
+    }
+
+    fn compare(&mut self, op: &Op, comparison: Comparison, (x, y): (NodeId, NodeId), at: Option<StepId>) -> Kernel {
+        let plan = self.plan;
+        if at.is_none() {
+            if let Some((comparison, moment)) = window(plan, op) {
+                return Kernel::Window(comparison, self.full(moment, Shape::Episodes, None));
+            }
+            if let Some((column, text)) = beside_its_episode(plan, op) {
+                let (keys, texts) = (self.node(column, None), self.full(text, Shape::Episodes, None));
+                return Kernel::KeysEqualEpisode { keys, texts, equal: comparison == Comparison::Equal };
+            }
+        }
+        if plan.node(x).ty == Type::Text {
+            self.compare_texts(comparison, x, y, at)
+        } else {
+            Kernel::Compare(comparison, self.node(x, at), self.node(y, at))
+        }
+    }
+
+    fn compare_texts(&mut self, comparison: Comparison, x: NodeId, y: NodeId, at: Option<StepId>) -> Kernel {
+        if !matches!(comparison, Comparison::Equal | Comparison::NotEqual) {
+            return Kernel::CompareTexts(comparison, self.plain(x, at), self.plain(y, at));
+        }
+        let equal = comparison == Comparison::Equal;
+        let (left, right) = (self.node(x, at), self.node(y, at));
+        let is_constant = |step: StepId| self.physical.step(step).shape == Shape::One;
+        match (self.gives_keys(left), self.gives_keys(right)) {
+            (true, _) if is_constant(right) => Kernel::KeysEqualText { keys: left, text: right, equal },
+            (_, true) if is_constant(left) => Kernel::KeysEqualText { keys: right, text: left, equal },
+            _ => Kernel::Compare(comparison, self.plain(x, at), self.plain(y, at)),
+        }
+    }
+
+    fn matches(&mut self, x: NodeId, pattern: &str, at: Option<StepId>) -> Kernel {
+        let texts = self.node(x, at);
+        if self.gives_keys(texts) {
+            Kernel::KeysMatch(texts, pattern.to_owned())
+        } else {
+            Kernel::SymbolsMatch(texts, pattern.to_owned())
+        }
+    }
+
+    fn case(
+        &mut self,
+        branches: &[(NodeId, NodeId)],
+        otherwise: Option<NodeId>,
+        ty: Type,
+        shape: Shape,
+        at: Option<StepId>,
+    ) -> Kernel {
+        let branches =
+            branches.iter().map(|(when, then)| (self.full(*when, shape, at), self.plain(*then, at))).collect();
+        let otherwise = if let Some(id) = otherwise {
+            self.full(id, shape, at)
+        } else {
+            let null = self.physical.push(Kernel::Constant(Constant::Null), ty, Shape::One);
+            self.physical.push(Kernel::Repeat(null), ty, shape)
+        };
+        Kernel::Case { branches, otherwise }
+    }
+
+    fn aggregate(&mut self, aggregate: Aggregate, x: NodeId) -> Kernel {
+        if !aggregate.searches() {
+            return Kernel::Fold(aggregate, self.full(x, Shape::Timesteps, None));
+        }
+        let (rest, windows) = split(self.plan, x);
+        let windows: Vec<_> = windows
+            .into_iter()
+            .map(|(comparison, moment)| (comparison, self.full(moment, Shape::Episodes, None)))
+            .collect();
+        let condition = self.full(rest, Shape::Timesteps, None);
+        let within = (!windows.is_empty()).then(|| {
+            // Rows, not values: the type is irrelevant.
+            self.physical.push(Kernel::Within(windows), Type::Int, Shape::Episodes)
+        });
+        Kernel::Search { aggregate, condition, within }
+    }
+
+    fn lookup(&mut self, x: NodeId, moment: NodeId) -> StepId {
+        let moments = self.full(moment, Shape::Episodes, None);
+        if !computes_after_lookup(self.plan, x) {
+            let values = self.node(x, None);
+            return self.at(values, moments);
+        }
+        let values = self.full(x, Shape::Episodes, Some(moments));
+        // A missing timestep gives null, even if the expression replaces nulls.
+        let ty = self.physical.step(values).ty;
+        self.physical.push(Kernel::NullWhereAbsent { values, moments }, ty, Shape::Episodes)
+    }
+}

@@ -1,0 +1,454 @@
+//! Reply quality by experiment, model and condition: how many replies could be read, how long they took, what they
+//! cost.
+//!
+//! Rule: sums are exact, so they do not depend on the order of files or threads. Values that a trace does not record
+//! are not counted, which differs from zero.
+
+use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
+
+use arrow::array::{Array as _, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, StringArray};
+use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::tables::builder::episode_ids;
+use super::tables::table::CONDITION;
+pub use mirrorstats_trace::episodes::replies::statuses;
+use mirrorstats_trace::episodes::replies::{REPLY_STATUS, ReplyCounts};
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::scan::EpisodeBatch;
+use mirrorstats_trace::schema::{self, Column, Kind};
+
+const READ: [&str; 7] =
+    [REPLY_STATUS, "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
+/// The separator between the repairs of one reply.
+const AND: char = '+';
+/// Costs are summed in billionths of a dollar.
+const NANO: f64 = 1e9;
+
+/// Whose replies they are.
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
+pub struct CellKey {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition; `default` where the trace names none.
+    pub condition: String,
+}
+
+/// The reply quality of one cell.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Quality {
+    /// Episodes in the traces.
+    pub episodes: u64,
+    /// Their steps.
+    pub steps: u64,
+    /// Episodes that the infrastructure ended, or kept from being recorded; null where nobody counted them.
+    pub lost: Option<u64>,
+    /// Replies by status; empty where the traces do not record it.
+    pub statuses: BTreeMap<String, u64>,
+    /// Repairs by name; a reply with two is counted under both.
+    pub repairs: BTreeMap<String, u64>,
+    /// The reason why replies gave no decision, in the words of their parser.
+    #[serde(skip)]
+    pub faults: BTreeMap<String, u64>,
+    /// Unusable and all replies of each episode with a reply.
+    #[serde(skip)]
+    pub by_episode: BTreeMap<String, [u64; 2]>,
+    /// Milliseconds from request to reply: how many replies took so long.
+    #[serde(skip)]
+    pub latencies: BTreeMap<i64, u64>,
+    /// Tokens of requests.
+    pub prompt_tokens: Total,
+    /// Tokens of replies.
+    pub completion_tokens: Total,
+    /// Costs, in billionths of a US dollar.
+    pub cost_nano_usd: Total,
+}
+
+/// A sum, and over how many replies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Total {
+    /// Replies with a value.
+    pub replies: u64,
+    /// The sum of the values.
+    pub sum: i128,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct QualityByCell(pub BTreeMap<CellKey, Quality>);
+
+impl Total {
+    fn add(&mut self, value: i128) {
+        self.replies += 1;
+        self.sum += value;
+    }
+
+    /// The mean per reply; `None` without replies.
+    #[expect(clippy::cast_precision_loss, reason = "a mean for people")]
+    pub fn mean(self) -> Option<f64> {
+        (self.replies > 0).then(|| self.sum as f64 / self.replies as f64)
+    }
+}
+
+impl Quality {
+    pub fn replies(&self) -> u64 {
+        self.statuses.values().sum()
+    }
+
+    pub fn unusable(&self) -> u64 {
+        self.unread().map(|(_, replies)| replies).sum()
+    }
+
+    pub fn unread(&self) -> impl Iterator<Item = (&String, &u64)> {
+        self.statuses.iter().filter(|(status, _)| !ReplyCounts::is_read(status))
+    }
+
+    /// The most frequent reason for replies without a decision, with its count; ties go to the alphabetically first.
+    pub fn commonest_fault(&self) -> Option<(&str, u64)> {
+        let faults = self.faults.iter().map(|(fault, replies)| (fault.as_str(), *replies));
+        faults.max_by(|(a, few), (b, many)| few.cmp(many).then_with(|| b.cmp(a)))
+    }
+
+    pub fn of_status(&self, status: &str) -> u64 {
+        self.statuses.get(status).copied().unwrap_or(0)
+    }
+
+    /// The lowest latency that this share of replies does not exceed, ms; `None` if none is recorded.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        clippy::cast_possible_truncation,
+        reason = "counts of replies are far below 2^53"
+    )]
+    pub fn latency(&self, share: f64) -> Option<i64> {
+        let all: u64 = self.latencies.values().sum();
+        let wanted = ((all as f64 * share).ceil() as u64).max(1);
+        let mut seen = 0;
+        self.latencies
+            .iter()
+            .find(|(_, replies)| {
+                seen += **replies;
+                seen >= wanted
+            })
+            .map(|(latency, _)| *latency)
+    }
+
+    pub fn merge(&mut self, other: &Self) {
+        self.episodes += other.episodes;
+        self.steps += other.steps;
+        self.lost = match (self.lost, other.lost) {
+            (Some(one), Some(other)) => Some(one + other),
+            (one, other) => one.or(other),
+        };
+        add(&mut self.statuses, &other.statuses);
+        add(&mut self.repairs, &other.repairs);
+        add(&mut self.faults, &other.faults);
+        self.by_episode.extend(other.by_episode.iter().map(|(id, replies)| (id.clone(), *replies)));
+        add(&mut self.latencies, &other.latencies);
+        for (total, more) in [
+            (&mut self.prompt_tokens, other.prompt_tokens),
+            (&mut self.completion_tokens, other.completion_tokens),
+            (&mut self.cost_nano_usd, other.cost_nano_usd),
+        ] {
+            total.replies += more.replies;
+            total.sum += more.sum;
+        }
+    }
+}
+
+fn add<K: Ord + Clone>(counts: &mut BTreeMap<K, u64>, more: &BTreeMap<K, u64>) {
+    for (key, replies) in more {
+        *counts.entry(key.clone()).or_default() += replies;
+    }
+}
+
+impl QualityByCell {
+    pub fn merge(&mut self, other: Self) {
+        for (key, quality) in other.0 {
+            self.0.entry(key).or_default().merge(&quality);
+        }
+    }
+
+    /// Takes the unusable and total replies of each episode out of this tally.
+    pub fn take_by_episode(&mut self) -> BTreeMap<String, [u64; 2]> {
+        self.0.values_mut().flat_map(|quality| std::mem::take(&mut quality.by_episode)).collect()
+    }
+
+    pub fn has_conditions(&self) -> bool {
+        let default = schema::column(CONDITION).and_then(Column::default_text);
+        self.0.keys().any(|key| Some(key.condition.as_str()) != default)
+    }
+
+    pub fn is_recorded(&self) -> bool {
+        self.0.values().any(|quality| !quality.statuses.is_empty())
+    }
+
+    pub fn whole(&self) -> Quality {
+        let mut whole = Quality::default();
+        self.0.values().for_each(|quality| whole.merge(quality));
+        whole
+    }
+}
+
+#[derive(Clone, Debug)]
+pub struct QualityReader {
+    columns: Vec<String>,
+    has_condition: bool,
+}
+
+impl QualityReader {
+    /// A reader of the columns that record replies in these traces. Skips columns whose type differs from the schema's.
+    pub fn of(traces: &TraceSet) -> Self {
+        Self::of_columns(traces, &READ)
+    }
+
+    /// Like [`QualityReader::of`], for the statuses of replies alone.
+    pub fn of_statuses(traces: &TraceSet) -> Self {
+        Self::of_columns(traces, &[REPLY_STATUS])
+    }
+
+    fn of_columns(traces: &TraceSet, names: &[&str]) -> Self {
+        let fits = |name: &&str| {
+            let known = schema::column(name).map(|column| column.stored.kind());
+            traces.declares(name) && traces.column(name).map(|column| column.kind) == known
+        };
+        let columns = names.iter().copied().filter(fits).map(str::to_owned).collect();
+        let has_condition =
+            traces.declares(CONDITION) && traces.column(CONDITION).is_some_and(|c| c.kind == Kind::String);
+        Self { columns, has_condition }
+    }
+
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    pub fn constants(&self) -> Option<String> {
+        self.has_condition.then(|| CONDITION.to_owned())
+    }
+
+    pub fn read(&self, batch: &EpisodeBatch, kept: Option<&BooleanArray>) -> QualityByCell {
+        let mut cells = Cells::default();
+        let columns = Columns::of(batch);
+        let keys = ["experiment", "model", CONDITION].map(|name| batch.episodes.column_by_name(name));
+        let ids = if columns.status.is_some() { episode_ids(batch) } else { Vec::new() };
+        for (episode, rows) in batch.offsets.windows(2).enumerate() {
+            if kept.is_some_and(|kept| !(kept.is_valid(episode) && kept.value(episode))) {
+                continue;
+            }
+            let counts = cells.of(keys, episode);
+            counts.rest.episodes += 1;
+            counts.rest.steps += (rows[1] - rows[0]) as u64;
+            if !self.columns.is_empty() {
+                (rows[0]..rows[1]).for_each(|row| columns.add(row, counts));
+                let replies = columns.replies(rows[0]..rows[1]).filter(|[_, all]| *all > 0);
+                counts.rest.by_episode.extend(ids.get(episode).cloned().zip(replies));
+            }
+        }
+        cells.finish(&columns)
+    }
+}
+
+/// Quality by cell while a batch is read; texts are indices of distinct values.
+#[derive(Default)]
+struct Cells {
+    known: HashMap<[Option<usize>; 3], usize>,
+    cells: Vec<(CellKey, Counts)>,
+}
+
+#[derive(Default)]
+struct Counts {
+    statuses: Vec<u64>,
+    repairs: Vec<u64>,
+    faults: Vec<u64>,
+    rest: Quality,
+}
+
+impl Cells {
+    fn of(&mut self, keys: [Option<&ArrayRef>; 3], episode: usize) -> &mut Counts {
+        let codes = keys.map(|column| {
+            let column = column?.as_dictionary_opt::<Int32Type>()?;
+            column.key(episode)
+        });
+        let at = *self.known.entry(codes).or_insert_with(|| {
+            let [experiment, model, condition] = [0, 1, 2].map(|at| text(keys[at], codes[at]));
+            let default = || schema::column(CONDITION).and_then(Column::default_text).unwrap_or_default().to_owned();
+            let key = CellKey {
+                experiment: experiment.unwrap_or_default(),
+                model: model.unwrap_or_default(),
+                condition: condition.unwrap_or_else(default),
+            };
+            self.cells.push((key, Counts::default()));
+            self.cells.len() - 1
+        });
+        &mut self.cells[at].1
+    }
+
+    fn finish(self, columns: &Columns<'_>) -> QualityByCell {
+        let mut found = QualityByCell::default();
+        for (key, counts) in self.cells {
+            let mut quality = counts.rest;
+            for (status, replies) in named(columns.status.as_ref(), &counts.statuses) {
+                *quality.statuses.entry(status.to_owned()).or_default() += replies;
+            }
+            for (repairs, replies) in named(columns.repair.as_ref(), &counts.repairs) {
+                for repair in repairs.split(AND).filter(|repair| !repair.is_empty()) {
+                    *quality.repairs.entry(repair.to_owned()).or_default() += replies;
+                }
+            }
+            for (fault, replies) in named(columns.fault.as_ref(), &counts.faults) {
+                *quality.faults.entry(fault.to_owned()).or_default() += replies;
+            }
+            found.0.entry(key).or_default().merge(&quality);
+        }
+        found
+    }
+}
+
+fn text(column: Option<&ArrayRef>, code: Option<usize>) -> Option<String> {
+    let texts = column?.as_dictionary_opt::<Int32Type>()?.values().as_string::<i32>();
+    code.map(|code| texts.value(code).to_owned())
+}
+
+fn named<'a>(column: Option<&'a Coded<'a>>, counts: &[u64]) -> Vec<(&'a str, u64)> {
+    let texts = column.map(|column| column.texts);
+    let all = counts.iter().enumerate().filter(|(_, count)| **count > 0);
+    all.filter_map(|(code, count)| Some((texts?.value(code), *count))).collect()
+}
+
+struct Columns<'a> {
+    status: Option<Coded<'a>>,
+    repair: Option<Coded<'a>>,
+    fault: Option<Coded<'a>>,
+    latency: Option<&'a ArrayRef>,
+    prompt_tokens: Option<&'a ArrayRef>,
+    completion_tokens: Option<&'a ArrayRef>,
+    cost: Option<&'a ArrayRef>,
+}
+
+impl<'a> Columns<'a> {
+    fn of(batch: &'a EpisodeBatch) -> Self {
+        let column = |name: &str| batch.steps.column_by_name(name);
+        Self {
+            status: Coded::of(batch, REPLY_STATUS),
+            repair: Coded::of(batch, "reply_repair"),
+            fault: Coded::of(batch, "reply_fault"),
+            latency: column("latency_ms"),
+            prompt_tokens: column("prompt_tokens"),
+            completion_tokens: column("completion_tokens"),
+            cost: column("cost_usd"),
+        }
+    }
+
+    fn replies(&self, rows: Range<usize>) -> Option<[u64; 2]> {
+        let status = self.status.as_ref()?;
+        let codes = rows.filter_map(|row| status.code(row));
+        Some(codes.fold([0; 2], |[unusable, all], code| {
+            [unusable + u64::from(!ReplyCounts::is_read(status.texts.value(code))), all + 1]
+        }))
+    }
+
+    fn add(&self, row: usize, counts: &mut Counts) {
+        count(self.status.as_ref(), row, &mut counts.statuses);
+        count(self.repair.as_ref(), row, &mut counts.repairs);
+        count(self.fault.as_ref(), row, &mut counts.faults);
+        if let Some(latency) = number::<Int64Type>(self.latency, row) {
+            *counts.rest.latencies.entry(latency).or_default() += 1;
+        }
+        for (column, total) in [
+            (self.prompt_tokens, &mut counts.rest.prompt_tokens),
+            (self.completion_tokens, &mut counts.rest.completion_tokens),
+        ] {
+            if let Some(tokens) = number::<Int64Type>(column, row) {
+                total.add(tokens.into());
+            }
+        }
+        if let Some(cost) = number::<Float64Type>(self.cost, row).filter(|cost| cost.is_finite()) {
+            #[expect(clippy::cast_possible_truncation, reason = "a cost of a reply is far below 2^127 billionths")]
+            counts.rest.cost_nano_usd.add((cost * NANO).round() as i128);
+        }
+    }
+}
+
+fn number<T: ArrowPrimitiveType>(column: Option<&ArrayRef>, row: usize) -> Option<T::Native> {
+    let column = column?.as_primitive_opt::<T>()?;
+    column.is_valid(row).then(|| column.value(row))
+}
+
+/// A text column as indices of its distinct values.
+struct Coded<'a> {
+    codes: Codes<'a>,
+    texts: &'a StringArray,
+}
+
+enum Codes<'a> {
+    Bytes(&'a arrow::array::UInt8Array),
+    Keys(&'a arrow::array::Int32Array),
+}
+
+impl<'a> Coded<'a> {
+    fn of(batch: &'a EpisodeBatch, name: &str) -> Option<Self> {
+        if let Some(texts) = batch.texts.iter().find(|texts| texts.name == name) {
+            return Some(Self { codes: Codes::Bytes(&texts.keys), texts: &texts.texts });
+        }
+        let column = batch.steps.column_by_name(name)?.as_dictionary_opt::<Int32Type>()?;
+        Some(Self { codes: Codes::Keys(column.keys()), texts: column.values().as_string() })
+    }
+
+    fn code(&self, row: usize) -> Option<usize> {
+        match self.codes {
+            Codes::Bytes(codes) => codes.is_valid(row).then(|| codes.value(row).into()),
+            Codes::Keys(codes) => codes.is_valid(row).then(|| usize::try_from(codes.value(row)).ok())?,
+        }
+    }
+}
+
+fn count(column: Option<&Coded<'_>>, row: usize, counts: &mut Vec<u64>) {
+    let Some(column) = column else { return };
+    let Some(code) = column.code(row) else { return };
+    if counts.len() <= code {
+        counts.resize(column.texts.len(), 0);
+    }
+    counts[code] += 1;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CellKey, Quality, QualityByCell};
+
+    fn of(latencies: &[i64]) -> Quality {
+        let mut quality = Quality { episodes: 1, steps: latencies.len() as u64, ..Quality::default() };
+        for latency in latencies {
+            *quality.latencies.entry(*latency).or_default() += 1;
+        }
+        quality
+    }
+
+    #[test]
+    fn a_share_of_latencies_is_the_least_that_is_not_exceeded() {
+        let quality = of(&[10, 20, 20, 40]);
+        assert_eq!(
+            [0.0, 0.25, 0.5, 0.75, 0.76, 1.0].map(|share| quality.latency(share).unwrap()),
+            [10, 10, 20, 20, 40, 40]
+        );
+        assert_eq!(Quality::default().latency(0.5), None);
+    }
+
+    #[test]
+    fn parts_add_up() {
+        let key = CellKey { experiment: "E1".into(), model: "m".into(), condition: "default".into() };
+        let part = |status: &str, lost| {
+            let statuses = [(status.to_owned(), 2)].into();
+            QualityByCell([(key.clone(), Quality { lost, statuses, ..of(&[5]) })].into())
+        };
+        let mut all = part("ok", None);
+        all.merge(part("refusal", Some(1)));
+        all.merge(part("refusal", Some(2)));
+        let whole = all.whole();
+        assert_eq!((whole.episodes, whole.replies(), whole.unusable(), whole.lost), (3, 6, 4, Some(3)));
+        assert_eq!((whole.of_status("refusal"), whole.of_status("timeout"), whole.latencies[&5]), (4, 0, 3));
+        assert!(all.is_recorded() && !all.has_conditions());
+    }
+}

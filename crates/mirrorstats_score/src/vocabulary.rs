@@ -1,0 +1,163 @@
+//! The columns that definitions may name: the schema's and the traces' own; and the columns that a question needs.
+
+use super::error::ScoreError;
+use mirrorstats_exact::suggest::nearest;
+use mirrorstats_metric::columns::{Column, Columns, Fallback, Level, Type};
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_metric::file::ColumnEntry;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::schema::domain::is_general;
+use mirrorstats_trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
+
+/// The schema's columns, which definitions may name whether or not the traces have them.
+pub fn schema_columns() -> Columns {
+    let column = |column: &mirrorstats_trace::schema::Column| {
+        let level = if column.constant { Level::Episode } else { Level::Step };
+        type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
+    };
+    let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
+    let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
+    let of_mirror = COLUMNS.iter().map(|column| column.name).filter(|name| !is_general(name));
+    let mut columns = columns.with_values(lists).with_mirror(of_mirror);
+    // A trace without a required column is an exception that its experiment declares.
+    set_fallbacks(&mut columns, |name| schema::column(name).is_some_and(|known| known.required));
+    columns
+}
+
+/// The columns that definitions may name before any trace is open: like [`schema_columns`], but each row may have a
+/// value.
+pub fn unknown_columns() -> Columns {
+    let mut columns = schema_columns();
+    set_fallbacks(&mut columns, |_| true);
+    columns
+}
+
+/// Sets the meaning of missing values; `is_read` returns true if some trace has the column.
+fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
+    for column in COLUMNS.iter() {
+        if let Some(expression) = column.default {
+            columns.set_fallback(column.name, Fallback { expression, is_read: is_read(column.name) });
+        }
+    }
+}
+
+/// The columns that definitions may name over these traces: the schema's and the traces' own.
+pub fn trace_columns(traces: &TraceSet) -> Columns {
+    let mut columns =
+        schema_columns().with_help("`mirrorstats trace schema`, `trace info` and `trace labels` list the columns");
+    set_fallbacks(&mut columns, |name| traces.declares(name));
+    for column in COLUMNS.iter().filter(|column| !traces.knows(column)) {
+        columns.forget(column.name);
+    }
+    for name in traces.column_names().into_iter().filter(|name| *name != "t") {
+        let found = traces.column(name);
+        if found.as_ref().is_some_and(|column| column.is_null) {
+            columns.set_null(name);
+        } else if let Some(ty) = found.and_then(|column| type_of(column.kind)) {
+            columns.set_own(name, Column { ty, level: Level::Step });
+        }
+    }
+    for name in traces.label_columns() {
+        columns.add_known(name, Column { ty: Type::Bool, level: Level::Episode });
+    }
+    columns
+}
+
+fn type_of(kind: Kind) -> Option<Type> {
+    match kind {
+        Kind::Bool => Some(Type::Bool),
+        Kind::Int => Some(Type::Int),
+        Kind::Float => Some(Type::Float),
+        Kind::String => Some(Type::Text),
+        Kind::Unsupported => None,
+    }
+}
+
+/// The type of a column of the traces; a column of nulls has the declared one. `None` if no trace has it.
+pub fn kind_in(traces: &TraceSet, declared: &[DeclaredColumn], name: &str) -> Option<Kind> {
+    let found = traces.column(name)?;
+    let declared = declared.iter().find(|column| found.is_null && column.name == name);
+    Some(declared.map_or(found.kind, |column| column.kind))
+}
+
+/// Checks that every column that is read is in every file, with one type.
+pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(), ScoreError> {
+    let plan = &definitions.plan;
+    let outputs = plan.outputs.iter().map(|output| (output.name.as_str(), output.node));
+    for (wanted_by, node) in outputs.chain(plan.filter.map(|node| ("--where", node))) {
+        for (column, _) in plan.columns(&plan.needed_by([node])) {
+            if let Some((problem, help)) = column_problem(traces, column) {
+                let (wanted_by, column) = (wanted_by.to_owned(), column.to_owned());
+                return Err(ScoreError::Column { wanted_by, column, problem, help });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
+    let absent = || "record it, or choose other metrics with --metrics".to_owned();
+    let has_default = traces.domain().column(column).is_some_and(|known| known.default.is_some());
+    let Some(found) = traces.column(column) else { return Some(("no trace has it".to_owned(), absent())) };
+    if let Some([(first, a), (second, b)]) = found.conflict {
+        let problem = format!("it is {} in `{first}` and {} in `{second}`", a.name(), b.name());
+        return Some((problem, "write it with one type in all traces".to_owned()));
+    }
+    found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
+}
+
+pub fn declared_columns(definitions: &Definitions) -> Vec<DeclaredColumn> {
+    let own = |(name, entry): (&str, &ColumnEntry)| DeclaredColumn {
+        name: name.to_owned(),
+        kind: kind_of(entry.column.ty),
+        values: entry.values.clone(),
+        constant: entry.column.level == Level::Episode,
+    };
+    definitions.declared_columns().map(own).collect()
+}
+
+const fn kind_of(ty: Type) -> Kind {
+    match ty {
+        Type::Bool => Kind::Bool,
+        Type::Int => Kind::Int,
+        Type::Float => Kind::Float,
+        Type::Text => Kind::String,
+    }
+}
+
+/// Returns true if a column of the schema has one value in all steps of an episode.
+pub fn is_constant(name: &str) -> bool {
+    COLUMNS.iter().any(|column| column.name == name && column.constant)
+}
+
+/// Refuses a column to group by that varies within an episode, or that some trace lacks.
+pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
+    if traces.is_label_column(label) {
+        return Ok(());
+    }
+    let problem = column_problem(traces, label);
+    // Optional columns are null in traces without them, or have a meaning for missing values.
+    let is_known_anyway = traces.domain().column(label).is_some_and(|known| {
+        let found = traces.column(label);
+        known.default_text().is_some() || !known.required && found.is_some_and(|found| found.conflict.is_none())
+    });
+    // Reading shows whether an own column varies between steps.
+    let is_constant = |name: &str| match traces.domain() {
+        Domain::Mirror => is_constant(name),
+        Domain::Own => {
+            name != "t" && traces.column(name).is_some_and(|column| matches!(column.kind, Kind::Int | Kind::String))
+        }
+    };
+    if is_constant(label) && (problem.is_none() || is_known_anyway) {
+        return Ok(());
+    }
+    let known = traces.column_names().into_iter().filter(|name| is_constant(name)).map(str::to_owned);
+    let known: Vec<String> = known.chain(traces.label_columns().iter().cloned()).collect();
+    let near = nearest(label, known.iter().map(String::as_str)).filter(|near| *near != label);
+    let help = match (near, problem) {
+        (Some(near), _) => format!("did you mean `{near}`?"),
+        (None, Some((problem, _))) => problem,
+        (None, None) => "its value changes from step to step".to_owned(),
+    };
+    Err(ScoreError::Label { name: label.to_owned(), known, help })
+}

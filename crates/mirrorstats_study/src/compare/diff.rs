@@ -1,0 +1,369 @@
+//! Compares two sides: definitions, scores or a report's folder. Gives the cells and episodes that differ, and the
+//! timesteps that decided each difference.
+//!
+//! Rule: only metrics of both sides are scored, so a side may have others that these traces do not support.
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::io;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use crate::error::StudyError;
+use crate::inputs::{ScoreFile, Source, Stamp};
+use crate::{LostAs, Question, Study, own_definitions, scores};
+use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
+use mirrorstats_report::cells::diff::{Changes, Flip, Overlap};
+use mirrorstats_report::cells::group::DEFAULT_BY;
+use mirrorstats_report::layout::TableOrder;
+use mirrorstats_report::style::Style;
+use mirrorstats_score::error::ScoreError;
+use mirrorstats_score::evidence::{self, Evidence};
+use mirrorstats_score::score_traces;
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::{flips, vocabulary};
+use mirrorstats_trace::inputs::{self, Input};
+use mirrorstats_trace::read::open::TraceSet;
+
+/// One side of a comparison.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Definitions by name or path.
+    Definitions(PathBuf),
+    /// Files of scores, as parts of one table.
+    Scores(Vec<ScoreFile>),
+}
+
+/// The request for a comparison.
+#[derive(Clone, Debug)]
+pub struct DiffRequest {
+    /// The metrics; all if absent.
+    pub metrics: Option<Vec<String>>,
+    /// A condition on episodes that applies to both sides; all episodes if absent.
+    pub filter: Option<String>,
+    /// The columns that cells are grouped by.
+    pub by: Vec<String>,
+    /// The definitions of scores that do not carry them; the default ones if absent.
+    pub definitions_of_scores: Option<PathBuf>,
+    pub threads: NonZeroUsize,
+}
+
+impl Default for DiffRequest {
+    fn default() -> Self {
+        Self {
+            metrics: None,
+            filter: None,
+            by: DEFAULT_BY.map(str::to_owned).to_vec(),
+            definitions_of_scores: None,
+            threads: std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
+        }
+    }
+}
+
+/// The differences between two sides.
+#[derive(Clone, Debug)]
+pub struct Diff {
+    /// Changed cells and episodes, in table order.
+    pub changes: Changes,
+    /// One sentence for each reason why deciding timesteps are unknown.
+    pub notes: Vec<String>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Pair {
+    pub before: Scored,
+    pub after: Scored,
+    /// The evidence for each difference, if one scan scored both sides.
+    pub evidence: Option<[BTreeMap<String, Evidence>; 2]>,
+}
+
+#[derive(Debug)]
+pub(crate) struct Scored {
+    pub table: EpisodeTable,
+    pub metrics: Vec<String>,
+    /// The definitions; `None` for scores from a file, which carry their definitions as text.
+    pub definitions: Option<Definitions>,
+}
+
+/// Compares two sides. `traces` are scored by definitions; if both sides are scores, they give the deciding timesteps.
+pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> Result<Diff, StudyError> {
+    let inputs = traces;
+    let style = Style::load("default")?;
+    let stamps = traces.iter().map(Stamp::of).collect::<Result<Vec<_>, _>>()?;
+    let source = if traces.is_empty() { None } else { Some(Source::open(traces)?) };
+    let traces = source.as_ref().map(Source::traces).transpose()?;
+    let pair = Pair::score(old, new, traces, request)?;
+    if pair.before.table.is_empty() && pair.after.table.is_empty() {
+        new.study(inputs, request)?.check_filter(0)?;
+    }
+    let mut changes = pair.changes(&request.by, &style)?;
+    let notes = match traces {
+        Some(traces) => {
+            let mut notes = pair.explain(&mut changes, traces, request.threads)?;
+            notes.extend([&pair.before, &pair.after].into_iter().filter_map(|side| side.unscored(traces)));
+            notes
+        }
+        None => Vec::new(),
+    };
+    stamps.iter().try_for_each(Stamp::check)?;
+    Ok(Diff { changes, notes })
+}
+
+impl Study {
+    /// The changes from this study to another: cells, and episodes by their ids. Two studies of the same traces under
+    /// one filter are scored in one scan, which gives the timesteps that decided each difference. Other studies lack
+    /// these timesteps, and a note says so. Errors: as [`Study::score`] for either study; sums of squares beyond 128
+    /// bits.
+    pub fn diff(&self, other: &Self) -> Result<Diff, StudyError> {
+        let by = self.question.by.clone().unwrap_or_else(|| DEFAULT_BY.map(str::to_owned).to_vec());
+        if self.differs_in_definitions_alone(other) {
+            let side = |study: &Self| Side::Definitions(study.question.definitions_name().to_owned());
+            let (metrics, filter) = (self.question.metrics.clone(), self.question.filter.clone());
+            let request = DiffRequest { metrics, filter, by, threads: self.threads, ..DiffRequest::default() };
+            return diff(&side(self), &side(other), &self.inputs, &request);
+        }
+        let style = Style::load("default")?;
+        let [before, after] = [self.score()?, other.score()?].map(|results| Scored::of(results.episodes, None));
+        let changes = Pair { before, after, evidence: None }.of_common_metrics().changes(&by, &style)?;
+        let notes = if changes.flips.is_empty() {
+            Vec::new()
+        } else {
+            let why = "the two studies are not of the same traces under one filter";
+            vec![format!("the timesteps that decided are not known: {why}")]
+        };
+        Ok(Diff { changes, notes })
+    }
+
+    fn differs_in_definitions_alone(&self, other: &Self) -> bool {
+        let question = |study: &Self| Question { definitions: None, ..study.question.clone() };
+        let are_traces = [self, other].iter().all(|study| matches!(study.source, Source::Traces(_)));
+        are_traces && self.stamps == other.stamps && question(self) == question(other)
+    }
+}
+
+impl Side {
+    /// The side that an argument names. Errors: a folder or a Parquet file without scores.
+    pub fn of(argument: impl AsRef<Path>) -> Result<Self, StudyError> {
+        let path = argument.as_ref();
+        let inside = path.join("episodes.parquet");
+        let inputs = if inside.is_file() {
+            vec![Input::new(inside)]
+        } else if path.is_dir() {
+            // A folder of parts, as a cluster writes it, is one table.
+            inputs::resolve(&[path.as_os_str().to_owned()], io::empty())?
+        } else {
+            vec![Input::new(path)]
+        };
+        match ScoreFile::all(&inputs)? {
+            Some(scores) => Ok(Self::Scores(scores)),
+            None if path.is_dir() || (path.extension() == Some(OsStr::new("parquet")) && path.exists()) => {
+                Err(StudyError::NoSide { argument: path.display().to_string() })
+            }
+            None => Ok(Self::Definitions(path.to_owned())),
+        }
+    }
+
+    fn question(&self, request: &DiffRequest) -> Question {
+        let definitions = match self {
+            Self::Definitions(name) => Some(name.clone()),
+            Self::Scores(files) if files.iter().any(|file| file.carries_definitions) => None,
+            Self::Scores(_) => request.definitions_of_scores.clone(),
+        };
+        Question {
+            definitions,
+            filter: request.filter.clone(),
+            metrics: None,
+            by: Some(request.by.clone()),
+            pool: true,
+            lost: LostAs::Nothing,
+            ..Question::default()
+        }
+    }
+
+    fn study(&self, traces: &[Input], request: &DiffRequest) -> Result<Study, StudyError> {
+        let inputs = match self {
+            Self::Definitions(_) => traces.to_vec(),
+            Self::Scores(files) => files.iter().map(|file| file.input.clone()).collect(),
+        };
+        Study::of(inputs)?.threads(request.threads).asked(self.question(request))
+    }
+
+    fn read(
+        &self,
+        traces: Option<&TraceSet>,
+        request: &DiffRequest,
+    ) -> Result<(Vec<String>, Option<EpisodeTable>), StudyError> {
+        match self {
+            Self::Definitions(name) => {
+                let columns = traces.map_or_else(vocabulary::schema_columns, vocabulary::trace_columns);
+                let definitions = Definitions::load(name, &columns)?;
+                Ok((definitions.catalog.metric.keys().cloned().collect(), None))
+            }
+            Self::Scores(files) => {
+                let table = scores::read(files, &Question { by: None, ..self.question(request) })?;
+                Ok((table.metrics.iter().map(|metric| metric.name.clone()).collect(), Some(table)))
+            }
+        }
+    }
+
+    fn bind(
+        &self,
+        common: &[String],
+        traces: Option<&TraceSet>,
+        request: &DiffRequest,
+    ) -> Result<Option<Definitions>, StudyError> {
+        match (self, traces) {
+            (Self::Scores(_), _) => Ok(None),
+            (Self::Definitions(name), None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
+            (Self::Definitions(_), Some(traces)) => {
+                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
+                question.bind(traces).map(Some)
+            }
+        }
+    }
+}
+
+impl Pair {
+    fn of_common_metrics(mut self) -> Self {
+        let common: Vec<String> =
+            self.after.metrics.iter().filter(|name| self.before.metrics.contains(name)).cloned().collect();
+        for side in [&mut self.before, &mut self.after] {
+            side.table.metrics.retain(|metric| common.contains(&metric.name));
+        }
+        self
+    }
+
+    fn score(old: &Side, new: &Side, traces: Option<&TraceSet>, request: &DiffRequest) -> Result<Self, StudyError> {
+        let (old_metrics, old_table) = old.read(traces, request)?;
+        let (new_metrics, new_table) = new.read(traces, request)?;
+        check_known(request.metrics.as_deref(), &old_metrics, &new_metrics)?;
+        let wanted = |name: &String| request.metrics.as_ref().is_none_or(|metrics| metrics.contains(name));
+        let [before, after] =
+            [old_metrics, new_metrics].map(|names| names.into_iter().filter(wanted).collect::<Vec<String>>());
+        let common: Vec<String> = after.iter().filter(|name| before.contains(name)).cloned().collect();
+        let of_common = |table: Option<EpisodeTable>| {
+            table.map(|mut table| {
+                table.metrics.retain(|metric| common.contains(&metric.name));
+                table
+            })
+        };
+        let definitions = [old.bind(&common, traces, request)?, new.bind(&common, traces, request)?];
+        let (tables, evidence) =
+            score_sides(&definitions, [of_common(old_table), of_common(new_table)], traces, request)?;
+        let ([old_definitions, new_definitions], [old_table, new_table]) = (definitions, tables);
+        Ok(Self {
+            evidence,
+            before: Scored { table: old_table, metrics: before, definitions: old_definitions },
+            after: Scored { table: new_table, metrics: after, definitions: new_definitions },
+        })
+    }
+
+    pub(crate) fn changes(&self, by: &[String], style: &Style) -> Result<Changes, StudyError> {
+        let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
+        changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
+        TableOrder { catalog: &self.after.table.catalog, style }.sort(&mut changes);
+        Ok(changes)
+    }
+
+    /// Adds the timesteps that decided each flip; returns a note for each reason why some are unknown.
+    pub(crate) fn explain(
+        &self,
+        changes: &mut Changes,
+        traces: &TraceSet,
+        threads: NonZeroUsize,
+    ) -> Result<Vec<String>, StudyError> {
+        if let Some([before, after]) = &self.evidence {
+            changes.explain_before(before);
+            changes.explain_after(after);
+            return Ok(Vec::new());
+        }
+        let wanted = changes.flipped_episodes();
+        let mut notes = Vec::new();
+        if wanted.is_empty() {
+            return Ok(notes);
+        }
+        let metrics = changes.flipped_metrics();
+        let mut evidence = |side: &Scored, word| match side.definitions(traces, &metrics) {
+            Ok(definitions) => Ok(evidence::explain_each(traces, &definitions, &wanted, threads)?),
+            Err(error @ (ScoreError::Carried(_) | ScoreError::Column { .. })) => {
+                notes.push(format!("the timesteps that decided {word} are not known: {error}"));
+                Ok(BTreeMap::new())
+            }
+            Err(error) => Err(StudyError::from(error)),
+        };
+        let (before, after) = (evidence(&self.before, "before")?, evidence(&self.after, "after")?);
+        changes.explain_before(&before);
+        changes.explain_after(&after);
+        if notes.is_empty() {
+            notes.extend(unexplained(changes));
+        }
+        Ok(notes)
+    }
+}
+
+impl Scored {
+    pub(crate) fn of(table: EpisodeTable, definitions: Option<Definitions>) -> Self {
+        let metrics = table.metrics.iter().map(|metric| metric.name.clone()).collect();
+        Self { table, metrics, definitions }
+    }
+
+    fn unscored(&self, traces: &TraceSet) -> Option<String> {
+        let is_kept = |name: &str| self.table.keys.iter().any(|key| key.experiment == name);
+        match own_definitions::unscored(self.definitions.as_ref()?, traces, is_kept)? {
+            StudyError::NotScored { experiment, definitions, own } => Some(format!(
+                "`{definitions}` does not score the experiment `{experiment}`, as `{own}` does: its zeros there mean nothing"
+            )),
+            _ => None,
+        }
+    }
+
+    fn definitions(&self, traces: &TraceSet, metrics: &[String]) -> Result<Definitions, ScoreError> {
+        match &self.definitions {
+            None => score_traces::restored(traces, &self.table.catalog, metrics),
+            Some(definitions) => {
+                let mut definitions = definitions.clone();
+                definitions.select(metrics)?;
+                Ok(definitions)
+            }
+        }
+    }
+}
+
+type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
+
+fn score_sides(
+    definitions: &[Option<Definitions>; 2],
+    read: [Option<EpisodeTable>; 2],
+    traces: Option<&TraceSet>,
+    request: &DiffRequest,
+) -> Result<ScoredSides, StudyError> {
+    let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
+    let score = |traces, definitions| score_traces::score(traces, definitions, &labels, request.threads);
+    match (definitions, read, traces) {
+        ([None, None], [Some(old), Some(new)], _) => Ok(([old, new], None)),
+        ([Some(old), Some(new)], _, Some(traces)) => {
+            let pair = flips::score_pair(traces, [old, new], &labels, request.threads)?;
+            Ok((pair.tables, Some(pair.evidence)))
+        }
+        ([Some(old), None], [_, Some(new)], Some(traces)) => Ok(([score(traces, old)?, new], None)),
+        ([None, Some(new)], [Some(old), _], Some(traces)) => Ok(([old, score(traces, new)?], None)),
+        _ => Err(StudyError::NoScores),
+    }
+}
+
+fn check_known(asked: Option<&[String]>, old: &[String], new: &[String]) -> Result<(), UnknownMetric> {
+    let known = || new.iter().chain(old.iter().filter(|name| !new.contains(name)));
+    match asked.unwrap_or_default().iter().find(|name| !known().any(|known| known == *name)) {
+        None => Ok(()),
+        Some(name) => Err(UnknownMetric::new(name, known().cloned().collect())),
+    }
+}
+
+fn unexplained(changes: &Changes) -> Option<String> {
+    let lacks = |flip: &&Flip| flip.timesteps.before.is_none() || flip.timesteps.after.is_none();
+    let count = changes.flips.iter().filter(lacks).count();
+    (count > 0).then(|| {
+        let all = changes.flips.len();
+        format!("{count} of {all} flips are not explained: the traces lack their episodes, or give other scores")
+    })
+}

@@ -1,0 +1,280 @@
+//! The study under other thresholds of mirror evidence: how each cell moves, and which conclusions change.
+//!
+//! Rule: all thresholds and the unchanged definitions share one scan and one plan. A threshold replaces the `let`
+//! `visible` of the definitions by `mirror_self_px >= K`, as an edited definition file would; it applies to a filter
+//! too.
+
+use std::collections::BTreeSet;
+use std::str::FromStr;
+
+use crate::error::StudyError;
+use crate::losses::{self, Counted};
+use crate::results::Results;
+use crate::scan::{ids, lost_episodes};
+use crate::{Question, Study, own_definitions};
+use mirrorstats_metric::columns::Columns;
+use mirrorstats_metric::definitions::{Definitions, ReplaceError};
+use mirrorstats_report::cells::group::{DEFAULT_BY, group};
+use mirrorstats_report::cells::{Cells, Group};
+use mirrorstats_report::figures::Figure;
+use mirrorstats_report::figures::sensitivity::{self as drawing, Stage};
+use mirrorstats_report::sensitivity::{Level, Reference, Sensitivity};
+use mirrorstats_report::statistics::Options;
+use mirrorstats_report::style::Style;
+use mirrorstats_score::physical::PhysicalPlan;
+use mirrorstats_score::score_traces::{self, Outputs};
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::vocabulary;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::schema::domain::Domain;
+
+/// The column that a threshold applies to.
+const PIXELS: &str = "mirror_self_px";
+const EVIDENCE: &str = "visible";
+/// The column that records evidence as ground truth.
+const GROUND_TRUTH: &str = "mirror_visible";
+const THRESHOLD_KEY: &str = "visibility_threshold_px";
+
+/// The default thresholds, px.
+pub const DEFAULT_THRESHOLDS: &str = "1,10,30,60,120,240";
+
+/// Thresholds, ascending and distinct, px.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Thresholds(Vec<u32>);
+
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "expected whole numbers of pixels from 1 on, separated by commas, such as {DEFAULT_THRESHOLDS}, found `{found}`"
+)]
+pub struct ThresholdsError {
+    found: String,
+}
+
+impl FromStr for Thresholds {
+    type Err = ThresholdsError;
+
+    fn from_str(text: &str) -> Result<Self, ThresholdsError> {
+        // Zero pixels are no evidence; no value of the column, a signed 32-bit integer, reaches a larger threshold.
+        let one = |text: &str| text.trim().parse::<u32>().ok().filter(|px| (1..=i32::MAX as u32).contains(px));
+        let all: Option<BTreeSet<u32>> = text.split(',').map(one).collect();
+        all.map(|all| Self(all.into_iter().collect())).ok_or_else(|| ThresholdsError { found: text.to_owned() })
+    }
+}
+
+#[derive(Debug)]
+pub struct SensitivityReport {
+    pub found: Sensitivity,
+    pub figure: Figure,
+    pub notes: Vec<String>,
+}
+
+impl Study {
+    /// Scores the study under each threshold of mirror evidence and under the unchanged definitions, in one scan.
+    /// Errors: as [`Study::statistics`]; scores, or traces that do not record `mirror_self_px` at every step;
+    /// definitions without a `let` named `visible` that is true or false at each step; metrics that do not depend on
+    /// it.
+    pub fn sensitivity(&self, thresholds: &Thresholds) -> Result<SensitivityReport, StudyError> {
+        let traces = self.source.traces()?;
+        check_pixels(traces)?;
+        let style = Style::load("default")?;
+        let trial = Trial::of(&self.question, traces, thresholds)?;
+        let scored = self.scan_trial(&trial, traces);
+        self.check_unchanged()?;
+        let stages = self.stages(&trial, scored?)?;
+        let lost = stages.first().map_or(0, |stage| stage.lost);
+        let levels: Vec<Level> = stages.iter().map(|stage| stage.level.clone()).collect();
+        let found = Sensitivity::of(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
+        let labels: Vec<Stage<'_>> =
+            stages.iter().map(|stage| Stage { px: stage.level.px, cells: &stage.drawn }).collect();
+        let drawn = drawing::SensitivityInput {
+            stages: &labels,
+            metrics: &trial.moved,
+            order: &style.sheet.row_order,
+            reference: &trial.reference.words(),
+        };
+        Ok(SensitivityReport { found, figure: drawing::draw(&drawn)?, notes: trial.notes(lost) })
+    }
+
+    fn scan_trial(&self, trial: &Trial, traces: &TraceSet) -> Result<Vec<EpisodeTable>, StudyError> {
+        let labels = self.question.labels_over(traces);
+        let outputs = Outputs { labels: &labels, ..Outputs::default() };
+        let all: Vec<&Definitions> =
+            trial.definitions.iter().chain([&trial.pixels]).chain(trial.lost.as_ref()).collect();
+        let tables = score_traces::score_all(traces, &all, outputs, self.threads)?.tables;
+        tables.first().map_or(Ok(()), |table| own_definitions::check(&trial.definitions[0], traces, table))?;
+        Ok(tables)
+    }
+
+    fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<ScoredLevel>, StudyError> {
+        let mut others = tables.split_off(trial.definitions.len()).into_iter();
+        let pixels = others.next();
+        let lost = others.next().map(|table| ids(&table));
+        self.check_filter(tables.iter().map(EpisodeTable::len).max().unwrap_or(0))?;
+        let counted: Vec<Counted> = tables
+            .into_iter()
+            .map(|table| self.counted_table(table, lost.clone()))
+            .collect::<Result<_, StudyError>>()?;
+        if let Some(pixels) = &pixels {
+            check_values(pixels, counted.iter().map(|counted| &counted.results.episodes))?;
+        }
+        let px = [None].into_iter().chain(trial.thresholds.iter().copied().map(Some));
+        px.zip(counted).map(|(px, counted)| self.stage(px, &counted)).collect()
+    }
+
+    fn counted_table(&self, table: EpisodeTable, lost: Option<BTreeSet<String>>) -> Result<Counted, StudyError> {
+        let mut results = Results { lost, ..Results::of(table) };
+        self.declare(&mut results)?;
+        Ok(self.counted(results))
+    }
+
+    fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<ScoredLevel, StudyError> {
+        let cells = self.cells_of(&counted.results.episodes)?;
+        // Conclusions need no intervals of cells; their bootstraps would take most of the time.
+        let none = |group: &Group| Group { moments: Vec::new(), ..group.clone() };
+        let bare = Cells { metrics: Vec::new(), groups: cells.groups.iter().map(none).collect(), ..cells.clone() };
+        let statistics = self.statistics_of(counted, &bare, &Options::default())?;
+        let shown = counted.results.with_conditions_as_models();
+        let drawn = group(&shown.episodes, &DEFAULT_BY.map(str::to_owned))?;
+        Ok(ScoredLevel { level: Level { px, cells, statistics }, drawn, lost: counted.lost.total() })
+    }
+}
+
+struct ScoredLevel {
+    level: Level,
+    drawn: Cells,
+    lost: u64,
+}
+
+struct Trial {
+    thresholds: Vec<u32>,
+    definitions: Vec<Definitions>,
+    pixels: Definitions,
+    lost: Option<Definitions>,
+    reference: Reference,
+    moved: Vec<String>,
+    unmoved: Vec<String>,
+    is_filter_moved: bool,
+}
+
+impl Trial {
+    fn of(question: &Question, traces: &TraceSet, thresholds: &Thresholds) -> Result<Self, StudyError> {
+        let columns = vocabulary::trace_columns(traces);
+        let as_is = question.bind(traces)?;
+        let bound = |px: u32| under(question, px, &columns);
+        let dependent = Dependent::between(&bound(1)?, &bound(2)?);
+        let (moved, unmoved): (Vec<String>, Vec<String>) =
+            metrics(&as_is).partition(|name| dependent.metrics.contains(name));
+        if moved.is_empty() {
+            return Err(StudyError::NothingMoves { name: EVIDENCE, metrics: unmoved.join(", ") });
+        }
+        let mut definitions = vec![as_is];
+        for px in &thresholds.0 {
+            definitions.push(score_traces::checked(traces, bound(*px)?)?);
+        }
+        let is_recorded = definitions[0].catalog.lets.get(EVIDENCE).is_some_and(|text| text.trim() == GROUND_TRUTH);
+        let count = format!("open = true\n[metric.MISSING]\nvalue = \"count({PIXELS} is null)\"\n");
+        Ok(Self {
+            thresholds: thresholds.0.clone(),
+            definitions,
+            pixels: Definitions::from_toml("pixels", &count, &columns)?,
+            lost: lost_episodes(traces)?,
+            reference: Reference { is_recorded, px: recorded_px(traces) },
+            moved,
+            unmoved,
+            is_filter_moved: dependent.filter,
+        })
+    }
+
+    fn notes(&self, lost: u64) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.is_filter_moved {
+            notes.push(format!("the filter depends on `{EVIDENCE}`: each threshold keeps its own episodes"));
+        }
+        if lost > 0 {
+            notes.push(format!("{}: in no denominator", losses::told(lost)));
+        }
+        notes
+    }
+}
+
+fn metrics(definitions: &Definitions) -> impl Iterator<Item = String> + '_ {
+    definitions.plan.outputs.iter().map(|output| output.name.clone())
+}
+
+/// The requested definitions, with evidence from this number of pixels on.
+fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions, StudyError> {
+    let as_is = question.load(columns)?;
+    let shown = format!("the threshold of {px} px");
+    let replaced = as_is.with_condition_let(EVIDENCE, &shown, &format!("{PIXELS} >= {px}"), columns);
+    let definitions = replaced.map_err(|source| match source {
+        ReplaceError::Faults(faults) => StudyError::Filter(faults),
+        source => StudyError::EvidenceLet { definitions: question.definitions_name().display().to_string(), source },
+    })?;
+    question.applied(definitions, columns)
+}
+
+/// The metrics and columns that depend on the evidence, found from two definitions that differ only in it.
+struct Dependent {
+    metrics: BTreeSet<String>,
+    filter: bool,
+}
+
+impl Dependent {
+    fn between(one: &Definitions, other: &Definitions) -> Self {
+        let plan = PhysicalPlan::of(&[&one.plan, &other.plan]);
+        let [one, other] = plan.scores() else { unreachable!("the plan has two sets of definitions") };
+        let pairs = one.metrics.iter().zip(&other.metrics);
+        let metrics = pairs.filter(|(one, other)| one.step != other.step).map(|(one, _)| one.name.clone()).collect();
+        Self { metrics, filter: one.filter != other.filter }
+    }
+}
+
+fn recorded_px(traces: &TraceSet) -> Vec<u64> {
+    let px: BTreeSet<u64> = traces.files().iter().filter_map(|file| file.recording()[THRESHOLD_KEY].as_u64()).collect();
+    px.into_iter().collect()
+}
+
+fn check_pixels(traces: &TraceSet) -> Result<(), StudyError> {
+    if traces.domain() == Domain::Own {
+        return Err(StudyError::NoMirror);
+    }
+    let problem = match traces.column(PIXELS) {
+        None => "no trace has it".to_owned(),
+        Some(found) => match (found.conflict, found.missing_from) {
+            (Some([(first, a), (second, b)]), _) => {
+                format!("it is {} in `{first}` and {} in `{second}`", a.name(), b.name())
+            }
+            (None, Some(file)) => format!("`{file}` has no such column"),
+            (None, None) => return Ok(()),
+        },
+    };
+    Err(StudyError::NoPixels { column: PIXELS, problem })
+}
+
+/// Checks that every step of the counted episodes has a value; `pixels` counts the steps without one.
+fn check_values<'t>(pixels: &EpisodeTable, counted: impl Iterator<Item = &'t EpisodeTable>) -> Result<(), StudyError> {
+    let ids: BTreeSet<&str> = counted.flat_map(|table| table.keys.iter().map(|key| key.episode_id)).collect();
+    let missing = pixels.metrics.iter().flat_map(|metric| pixels.keys.iter().zip(metric.iter()));
+    let missing: Vec<(&str, i64)> = missing
+        .filter_map(|(key, count)| Some((key.episode_id, count.filter(|count| *count > 0)?)))
+        .filter(|(id, _)| ids.contains(id))
+        .collect();
+    let Some((episode, _)) = missing.first() else { return Ok(()) };
+    let steps: i64 = missing.iter().map(|(_, count)| count).sum();
+    let steps = format!("{steps} in {} of {} episodes", missing.len(), ids.len());
+    Err(StudyError::PixelsMissing { column: PIXELS, steps, episode: (*episode).to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DEFAULT_THRESHOLDS, Thresholds};
+
+    #[test]
+    fn thresholds_ascend_and_are_whole_numbers_of_pixels() {
+        assert_eq!("60, 1,60,10".parse(), Ok(Thresholds(vec![1, 10, 60])));
+        assert_eq!(DEFAULT_THRESHOLDS.parse(), Ok(Thresholds(vec![1, 10, 30, 60, 120, 240])));
+        for text in ["", "0", "1,,2", "-1", "1.5", "60px", "2147483648"] {
+            assert!(text.parse::<Thresholds>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Episodes lost because no answer came: ended by the infrastructure, or never recorded.
+//!
+//! Rule: a lost episode is neither a success nor a failure. Denominators exclude lost episodes, or on request include
+//! all of them as failures; the answer says which. A file of scores keeps their rows, marked by the label `lost`.
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+
+use super::Study;
+use super::error::StudyError;
+use super::results::Results;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind};
+use mirrorstats_report::cells::group::CONDITION;
+use mirrorstats_report::statistics::Replies;
+use mirrorstats_score::quality::{CellKey, QualityByCell};
+use mirrorstats_score::tables::builder::TableBuilder;
+use mirrorstats_score::tables::lost_counts::LostCounts;
+use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, LOST, LabelColumn, UNUSABLE_REPLIES};
+use mirrorstats_trace::episodes::lost::{self, LostEpisode};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::schema::{self, Column};
+
+const YES: &str = "true";
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LostAs {
+    #[default]
+    Nothing,
+    /// Failures, in the denominator of every rate that is defined for all episodes.
+    Failure,
+}
+
+#[derive(Debug)]
+pub(super) struct Counted {
+    pub results: Results,
+    pub all: Option<EpisodeTable>,
+    pub lost: LostCounts,
+}
+
+impl Counted {
+    pub(super) fn replies(&self) -> Option<Replies> {
+        Replies::of(self.all.as_ref().unwrap_or(&self.results.episodes))
+    }
+}
+
+pub(super) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
+    let mut listed = lost::beside(inputs)?;
+    if listed.is_empty() {
+        return Ok(listed);
+    }
+    let ids: HashSet<&str> = table.keys.iter().map(|key| key.episode_id).collect();
+    let models: BTreeSet<&str> = table.keys.models().iter().flatten().collect();
+    listed.retain(|episode| !ids.contains(episode.episode_id.as_str()) && models.contains(episode.model.as_str()));
+    Ok(listed)
+}
+
+pub(super) fn label(results: &mut Results) {
+    let Results { episodes, lost, quality, .. } = results;
+    if let Some(ids) = lost.as_ref().filter(|ids| !ids.is_empty()) {
+        let is_lost = |row| ids.contains(episodes.keys.get(row).episode_id).then_some(YES);
+        let values = (0..episodes.len()).map(is_lost).collect();
+        episodes.labels.push(LabelColumn { name: LOST.to_owned(), values });
+    }
+    if let Some(quality) = quality {
+        let replies = quality.take_by_episode();
+        if !replies.is_empty() {
+            let text =
+                |row| replies.get(episodes.keys.get(row).episode_id).map(|[unusable, all]| format!("{unusable}/{all}"));
+            let values = (0..episodes.len()).map(text).collect();
+            episodes.labels.push(LabelColumn { name: UNUSABLE_REPLIES.to_owned(), values });
+        }
+        count(quality, &counts(episodes), lost.is_some() || !episodes.declared.unrecorded.is_empty());
+    }
+}
+
+fn count(quality: &mut QualityByCell, lost: &LostCounts, is_known: bool) {
+    for (key, lost) in lost.iter() {
+        quality.0.entry(key.clone()).or_default().lost = Some(*lost);
+    }
+    if is_known {
+        quality.0.values_mut().for_each(|quality| quality.lost = quality.lost.or(Some(0)));
+    }
+}
+
+fn counts(table: &EpisodeTable) -> LostCounts {
+    let mut counts = LostCounts::default();
+    for row in (0..table.len()).filter(|row| is_lost(table, *row)) {
+        let key = table.keys.get(row);
+        counts.add(cell(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row))));
+    }
+    for episode in &table.declared.unrecorded {
+        counts.add(cell(&episode.experiment, &episode.model, episode.condition.as_deref()));
+    }
+    counts
+}
+
+fn cell(experiment: &str, model: &str, condition: Option<&str>) -> CellKey {
+    let condition = condition.or_else(|| schema::column(CONDITION).and_then(Column::default_text)).unwrap_or_default();
+    CellKey { experiment: experiment.to_owned(), model: model.to_owned(), condition: condition.to_owned() }
+}
+
+/// A line that names the cells with lost episodes or replies without a decision; `None` without any.
+pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Option<String> {
+    const NAMED: usize = 8;
+    let mut cells: BTreeMap<[&str; 2], [u64; 3]> = BTreeMap::new();
+    for (key, count) in lost.iter() {
+        cells.entry([&key.experiment, &key.model]).or_default()[0] += count;
+    }
+    for it in replies.into_iter().flat_map(|replies| &replies.cells) {
+        let counts = cells.entry([&it.key.experiment, &it.key.model]).or_default();
+        (counts[1], counts[2]) = (counts[1] + it.unusable, counts[2] + it.replies);
+    }
+    let told = |([experiment, model], [lost, unusable, replies]): (&[&str; 2], &[u64; 3])| {
+        let lost = (*lost > 0).then(|| format!("{lost} lost"));
+        let unusable = (*unusable > 0).then(|| format!("{unusable} of {replies} replies without a decision"));
+        let what: Vec<String> = lost.into_iter().chain(unusable).collect();
+        format!("{} {} {}", visible(experiment), visible(model), what.join(", "))
+    };
+    let named: Vec<String> = cells.iter().take(NAMED).map(told).collect();
+    let rest = cells.len().saturating_sub(NAMED);
+    let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
+    (!named.is_empty()).then(|| format!("Beside the numbers: {}{rest}.", named.join("; ")))
+}
+
+pub(super) fn told(lost: u64) -> String {
+    let (noun, verb) = if lost == 1 { ("episode", "was") } else { ("episodes", "were") };
+    format!("{lost} {noun} {verb} lost without an answer")
+}
+
+fn is_lost(table: &EpisodeTable, row: usize) -> bool {
+    table.label(LOST).is_some_and(|label| label.get(row) == Some(YES))
+}
+
+impl Study {
+    pub(super) fn counted(&self, results: Results) -> Counted {
+        let lost = counts(&results.episodes);
+        if lost.is_empty() {
+            return Counted { results, all: None, lost };
+        }
+        match self.question.lost {
+            LostAs::Nothing => without(results, lost),
+            LostAs::Failure => {
+                let episodes = with_failures(&results.episodes);
+                // Episodes without a look, claim or decision have no timeline.
+                let timelines = results.timelines.filter(|timelines| timelines.len() == episodes.len());
+                let all = Some(episodes.clone());
+                Counted { results: Results { episodes, timelines, ..results }, all, lost }
+            }
+        }
+    }
+}
+
+fn without(results: Results, lost: LostCounts) -> Counted {
+    let all = results.episodes;
+    let kept: Vec<usize> = (0..all.len()).filter(|row| !is_lost(&all, *row)).collect();
+    let mut episodes = all.taken(&kept);
+    episodes.labels.retain(|label| label.name != LOST);
+    let timelines = results.timelines;
+    let timelines = timelines.map(|timelines| kept.iter().map(|row| timelines[*row].clone()).collect());
+    Counted { results: Results { episodes, timelines, ..results }, all: Some(all), lost }
+}
+
+/// Adds a row for each episode that was never recorded: a failure in each rate that every episode has, otherwise
+/// undefined.
+fn with_failures(table: &EpisodeTable) -> EpisodeTable {
+    let mut builder = TableBuilder::new(table.header());
+    for row in 0..table.len() {
+        let labels = table.labels.iter().map(|label| label.values.get(row));
+        builder.push(table.keys.get(row), labels, table.metrics.iter().map(|metric| metric.get(row)));
+    }
+    for episode in &table.declared.unrecorded {
+        let key = KeyRef {
+            experiment: &episode.experiment,
+            model: &episode.model,
+            seed: episode.seed,
+            run: episode.run,
+            episode_id: &episode.episode_id,
+        };
+        let label = |label: &LabelColumn| match label.name.as_str() {
+            LOST => Some(YES),
+            CONDITION => episode.condition.as_deref().or_else(|| schema::column(CONDITION)?.default_text()),
+            _ => None,
+        };
+        let failure = |metric: &mirrorstats_score::tables::table::MetricColumn| failure(&table.catalog, &metric.name);
+        builder.push(key, table.labels.iter().map(label), table.metrics.iter().map(failure));
+    }
+    EpisodeTable { declared: table.declared.clone(), ..builder.finish() }
+}
+
+fn failure(catalog: &Catalog, metric: &str) -> Option<i64> {
+    let metric = catalog.metric.get(metric)?;
+    match (metric.kind, metric.better) {
+        (Kind::Rate, Better::Higher) if metric.when.is_none() => Some(0),
+        (Kind::Rate, Better::Lower) if metric.when.is_none() => Some(1),
+        _ => None,
+    }
+}

@@ -1,0 +1,138 @@
+//! The inputs of figures, and the figures of a report.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use crate::error::StudyError;
+use crate::results::Results;
+use mirrorstats_metric::catalogs::catalog::Better;
+use mirrorstats_report::bundle::OutputFile;
+use mirrorstats_report::cells::Cells;
+use mirrorstats_report::cells::group::{DEFAULT_BY, group};
+use mirrorstats_report::figures::{self, Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
+use mirrorstats_report::html;
+use mirrorstats_report::style::Style;
+
+/// The options of a figure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureOptions {
+    /// `default`, `paper`, or the path of a style file, for the order of models, metrics and captions.
+    pub style: PathBuf,
+    /// The metrics shown, in the order of their roles; the style's metrics if None.
+    pub metrics: Option<Vec<String>>,
+    /// A custom heading.
+    pub title: Option<String>,
+    /// The printed width; the drawn width if None.
+    pub width: Option<FigureWidth>,
+    /// The number of models to show, the best by their means of the first metric over all experiments; all if None.
+    pub top: Option<usize>,
+}
+
+impl Default for FigureOptions {
+    fn default() -> Self {
+        Self { style: PathBuf::from("default"), metrics: None, title: None, width: None, top: None }
+    }
+}
+
+#[derive(Debug)]
+pub(crate) struct FigureInputs<'a> {
+    cells: Cells,
+    style: &'a Style,
+    options: FigureOptions,
+    results: Cow<'a, Results>,
+    remark: Option<String>,
+}
+
+pub const MANY_MODELS: usize = 20;
+
+/// The number of models in a report's figures if there are more than [`MANY_MODELS`].
+const SHOWN_OF_MANY: usize = 12;
+
+#[derive(Debug, Default)]
+pub(crate) struct Drawings {
+    pub drawn: Vec<(FigureName, Figure)>,
+    pub left_out: Vec<(FigureName, FigureError)>,
+}
+
+impl<'a> FigureInputs<'a> {
+    /// Groups the episodes for figures: by experiment and model, with another condition as a model of its own.
+    pub(crate) fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+        let results = results.with_conditions_as_models();
+        let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
+        Ok(Self { cells, style, options: FigureOptions::default(), results, remark: None })
+    }
+
+    /// The same for a page or a folder of all figures: of many models only the best, as the captions say.
+    pub(crate) fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+        let all = Self::of(results, style)?;
+        let metric = results.episodes.catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);
+        let models: BTreeSet<&str> = all.results.episodes.keys.iter().map(|key| key.model).collect();
+        let Some((metric, _)) = metric.filter(|_| models.len() > MANY_MODELS) else { return Ok(all) };
+        let remark = format!("The best {SHOWN_OF_MANY} of {} models by {metric}.", models.len());
+        let results: Cow<'_, Results> = Cow::Owned(all.results.into_owned().of_the_best(SHOWN_OF_MANY, metric));
+        let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
+        Ok(Self { cells, style, options: FigureOptions::default(), results, remark: Some(remark) })
+    }
+
+    pub(crate) fn with(self, options: FigureOptions) -> Self {
+        Self { options, ..self }
+    }
+
+    pub(crate) fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
+        figures::draw(name, &self.input())
+    }
+
+    pub(crate) fn draw_all(&self) -> Drawings {
+        let mut drawings = Drawings::default();
+        for name in FigureName::ALL {
+            match self.draw(name) {
+                Ok(figure) => drawings.drawn.push((name, figure.remarked(self.remark.as_deref()))),
+                // Most definitions declare no factor, or the traces lack it.
+                Err(FigureError::NoFactor { .. }) => {}
+                Err(error) => drawings.left_out.push((name, error)),
+            }
+        }
+        drawings
+    }
+
+    fn input(&self) -> Input<'_> {
+        Input {
+            cells: &self.cells,
+            order: &self.style.sheet.row_order,
+            sheets: &self.style.sheet.figure,
+            episodes: Some(&self.results.episodes),
+            outcomes: self.results.outcomes.as_ref(),
+            timelines: self.results.timelines.as_deref(),
+            title: self.options.title.as_deref(),
+            width: self.options.width,
+        }
+    }
+}
+
+impl Drawings {
+    pub(crate) fn svgs(&self) -> Vec<String> {
+        self.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect()
+    }
+
+    pub(crate) fn on_page<'a>(&'a self, svgs: &'a [String]) -> Vec<html::EmbeddedFigure<'a>> {
+        let figure = |((name, drawn), svg): (&'a (FigureName, Figure), &'a String)| html::EmbeddedFigure {
+            name: name.name(),
+            title: drawn.title(),
+            caption: drawn.caption(),
+            svg,
+        };
+        self.drawn.iter().zip(svgs).map(figure).collect()
+    }
+
+    pub(crate) fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
+        let mut files = Vec::new();
+        for (name, figure) in &self.drawn {
+            for format in FigureFormat::ALL {
+                let path = format!("figures/{name}.{}", format.ending()).into();
+                files.push(OutputFile { path, bytes: format.encode(figure)? });
+            }
+        }
+        Ok(files)
+    }
+}

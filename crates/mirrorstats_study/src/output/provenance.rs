@@ -1,0 +1,194 @@
+//! Finds the traces of a report by its manifest.
+//!
+//! Rule: a file is the trace in the manifest if it has its hash, in whatever folder. All changed or missing traces are
+//! reported together, and no report is made without them.
+
+use std::ffi::OsStr;
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::{hash, input};
+use mirrorstats_report::bundle::{self, Manifest};
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::schema::SCHEMA_VERSION;
+
+#[derive(Debug, thiserror::Error)]
+pub enum ProvenanceError {
+    #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
+    NoManifest { path: PathBuf, source: io::Error },
+    #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
+    Malformed { path: PathBuf, found: String },
+    #[error("{} of {all} traces of the report have changed:\n{}\n{REMEDY}", faults.len(), lines(faults))]
+    Traces { all: usize, faults: Vec<TraceFault> },
+}
+
+const REMEDY: &str = "  help: restore them, say where they are with --traces, or make a new report of what there is with `mirrorstats report`";
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TraceFault {
+    pub path: String,
+    pub expected: String,
+    /// The file found instead, with its path; `None` if there is no such file.
+    pub found: Option<(Found, PathBuf)>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Found {
+    Other(String),
+    Unreadable(String),
+}
+
+impl fmt::Display for TraceFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { path, expected, found } = self;
+        match found {
+            None => write!(f, "  {path}: missing; expected sha256 {expected}"),
+            Some((Found::Other(hash), at)) => {
+                write!(f, "  {path}: changed; expected sha256 {expected}, found {hash} in {}", at.display())
+            }
+            Some((Found::Unreadable(why), at)) => {
+                write!(f, "  {path}: cannot read `{}`: {why}; expected sha256 {expected}", at.display())
+            }
+        }
+    }
+}
+
+/// The most traces that a message lists, so that the remedy stays visible.
+const TOLD: usize = 5;
+
+fn lines(faults: &[TraceFault]) -> String {
+    let mut lines: Vec<String> = faults.iter().take(TOLD).map(ToString::to_string).collect();
+    if let Some(more) = faults.len().checked_sub(TOLD).filter(|more| *more > 0) {
+        lines.push(format!("  and {more} more"));
+    }
+    lines.join("\n")
+}
+
+/// A trace takes about 200 bytes of a manifest.
+const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
+
+pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
+    let path = report.join("manifest.json");
+    let text = match input::text(&path, LARGEST) {
+        Ok(text) => text,
+        Err(source) => return Err(ProvenanceError::NoManifest { path, source }),
+    };
+    let malformed = |found: String| ProvenanceError::Malformed { path: path.clone(), found };
+    let manifest: Manifest = serde_json::from_str(&text).map_err(|error| malformed(error.to_string()))?;
+    if manifest.schema_version > SCHEMA_VERSION {
+        let found = format!("one over trace schema {}, newer than {SCHEMA_VERSION}", manifest.schema_version);
+        return Err(malformed(found));
+    }
+    if manifest.inputs.is_empty() {
+        return Err(malformed("one that names no trace".to_owned()));
+    }
+    match manifest.inputs.iter().find(|input| !is_plain(&input.path)) {
+        None => Ok(manifest),
+        Some(input) => Err(malformed(format!("the path `{}`, which leads out of its folder", input.path))),
+    }
+}
+
+fn is_plain(path: &str) -> bool {
+    !path.is_empty() && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
+}
+
+/// The traces of a manifest, by their names in it, searched in `places` in order.
+pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, ProvenanceError> {
+    let (mut found, mut faults) = (Vec::new(), Vec::new());
+    for wanted in &manifest.inputs {
+        match find(wanted, places) {
+            Ok(path) => found.push(Input { name: wanted.path.clone(), path }),
+            Err(fault) => faults.push(fault),
+        }
+    }
+    let all = manifest.inputs.len();
+    if faults.is_empty() { Ok(found) } else { Err(ProvenanceError::Traces { all, faults }) }
+}
+
+fn find(wanted: &bundle::InputFile, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
+    let mut other = None;
+    for path in places.iter().flat_map(|place| candidates(wanted, place)) {
+        match input::open(&path).and_then(hash::of_reader) {
+            Ok(hash) if hash == wanted.sha256 => return Ok(path),
+            Ok(hash) => other = other.or(Some((Found::Other(hash), path))),
+            Err(error) => other = other.or(Some((Found::Unreadable(error.to_string()), path))),
+        }
+    }
+    Err(TraceFault { path: wanted.path.clone(), expected: wanted.sha256.clone(), found: other })
+}
+
+fn candidates(wanted: &bundle::InputFile, place: &Path) -> Vec<PathBuf> {
+    let path = Path::new(&wanted.path);
+    if place.is_file() {
+        let names = [place, path].map(|path| path.file_name().map(OsStr::to_string_lossy));
+        return if names[0] == names[1] { vec![place.to_owned()] } else { Vec::new() };
+    }
+    let mut candidates = shown_as(place, path);
+    for bare in path.file_name().map(|name| shown_as(place, Path::new(name))).unwrap_or_default() {
+        if !candidates.contains(&bare) {
+            candidates.push(bare);
+        }
+    }
+    candidates.retain(|path| path.is_file());
+    candidates
+}
+
+fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
+    path.components().fold(vec![folder.to_owned()], |folders, part| {
+        let part = part.as_os_str().to_string_lossy();
+        if !part.contains(char::REPLACEMENT_CHARACTER) {
+            return folders.iter().map(|folder| folder.join(&*part)).collect();
+        }
+        let is_shown = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy() == part);
+        let entries = folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten();
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_shown).collect()
+    })
+}
+
+/// The places where a report's traces are searched: the given ones, else the current folder, the report's folder and
+/// its parents.
+pub(crate) fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
+    if !told.is_empty() {
+        return told.to_vec();
+    }
+    let here = PathBuf::from(".");
+    let report = fs::canonicalize(report).unwrap_or_else(|_| report.to_owned());
+    std::iter::once(here).chain(report.ancestors().map(Path::to_owned)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{candidates, is_plain, places};
+    use mirrorstats_report::bundle;
+    use std::path::{Path, PathBuf};
+
+    #[test]
+    fn paths_outside_the_folder_are_not_plain() {
+        for (path, plain) in
+            [("a.parquet", true), ("runs/a.parquet", true), ("/a.parquet", false), ("../a.parquet", false), ("", false)]
+        {
+            assert_eq!(is_plain(path), plain, "{path}");
+        }
+    }
+
+    #[test]
+    fn a_given_folder_is_the_only_one_searched() {
+        assert_eq!(places(Path::new("r"), &[PathBuf::from("there")]), [PathBuf::from("there")]);
+    }
+
+    #[test]
+    fn a_trace_may_lie_under_its_path_or_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("runs")).unwrap();
+        let wanted = bundle::InputFile { path: "runs/a.parquet".into(), sha256: String::new(), bytes: 0 };
+        let [deep, bare] = ["runs/a.parquet", "a.parquet"].map(|name| folder.path().join(name));
+        std::fs::write(&bare, "").unwrap();
+        assert_eq!(candidates(&wanted, folder.path()), std::slice::from_ref(&bare));
+        assert_eq!(candidates(&wanted, &bare), std::slice::from_ref(&bare));
+        std::fs::write(&deep, "").unwrap();
+        assert_eq!(candidates(&wanted, folder.path()), [deep, bare]);
+    }
+}

@@ -1,0 +1,259 @@
+//! The report of a study: tables, figures, a page, and the folder that contains them.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use crate::error::StudyError;
+use crate::figure_inputs::{Drawings, FigureInputs};
+use crate::losses::{self, Counted};
+use crate::results::{Outputs, Results};
+use crate::{DEFAULT_DEFINITIONS, LostAs, Source, Study, scores};
+use mirrorstats_exact::replace;
+use mirrorstats_exact::suggest::hint;
+use mirrorstats_report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
+use mirrorstats_report::cells::Cells;
+use mirrorstats_report::figures::FigureName;
+use mirrorstats_report::html::{self, Page, Recordings};
+use mirrorstats_report::layout::{MetricTable, quality};
+use mirrorstats_report::plan::departures::Looks;
+use mirrorstats_report::statistics::{Options, Statistics};
+use mirrorstats_report::style::{MAIN_TABLE, OTHER_TABLE, Style};
+use mirrorstats_report::tables::ListTable;
+use mirrorstats_score::format::Format;
+use mirrorstats_score::tables::lost_counts::LostCounts;
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_trace::footers::checksums::missing_note;
+use mirrorstats_trace::schema::SCHEMA_VERSION;
+use mirrorstats_trace::{footers::answered, renderer};
+
+pub(crate) const MOST_LISTED: usize = 20_000;
+
+/// The options of a report.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReportOptions {
+    /// `default`, `paper`, or the path of a style file.
+    pub style: PathBuf,
+    /// True to include figures and `report.html`.
+    pub figures: bool,
+}
+
+impl Default for ReportOptions {
+    fn default() -> Self {
+        Self { style: PathBuf::from("default"), figures: true }
+    }
+}
+
+/// A report, in memory.
+#[derive(Debug)]
+pub struct Report {
+    /// The results of the scan.
+    pub results: Results,
+    /// All episodes, if some were lost; `results` has the counted ones.
+    all: Option<EpisodeTable>,
+    /// The cells, grouped as requested.
+    pub cells: Cells,
+    /// The tables, as the style lays them out.
+    pub tables: Vec<MetricTable>,
+    /// Ranks, if the style marks ties; reply quality, if the inputs are traces.
+    pub lists: Vec<ListTable>,
+    pub manifest: Manifest,
+    /// The number of replies without a decision; `None` without any, or if not recorded.
+    pub replies: Option<String>,
+    /// The missing parts of the folder with their reasons, one sentence each.
+    pub notes: Vec<String>,
+    pub(crate) style: Style,
+    threads: NonZeroUsize,
+    recordings: Option<Recordings>,
+    illustrations: Vec<OutputFile>,
+    read: Vec<PathBuf>,
+    inputs: usize,
+}
+
+#[derive(Clone, Debug)]
+pub struct WrittenReport {
+    pub files: Vec<String>,
+    pub manifest: Manifest,
+}
+
+impl Study {
+    /// Refuses a folder whose report contains a file that this study reads, before anything is read. Errors: an input
+    /// in the folder.
+    pub fn check_folder(&self, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
+        bundle::check_old(out, &self.files_read(Some(&options.style)))?;
+        self.check_out(out)
+    }
+
+    /// Makes the report of the study.
+    pub fn report(&self, options: &ReportOptions) -> Result<Report, StudyError> {
+        // Small files first: a mistake in the style should not cost a scan of the traces.
+        let style = Style::load(&options.style)?;
+        let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
+        let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
+        let results = self.scan(outputs)?;
+        self.check_filter(results.episodes.len())?;
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        let statistics =
+            options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
+        let replies = counted.replies();
+        let Counted { results, all, lost } = counted;
+        let (tables, ranks) = self.tables(&results.episodes, (&lost, replies.as_ref()), &cells, &style)?;
+        let replies = replies.and_then(|replies| replies.sentence());
+        let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
+        let filter = self.question.filter.clone();
+        let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
+        let mut notes = self.notes(&results, &lost);
+        notes.extend(self.copies(&results.episodes)?.map(|copies| copies.sentence));
+        let own = Options { selection: self.selection(&results.episodes), ..Options::default() };
+        let departures = self.departures(&results.episodes, &own, Looks::Once).into_iter().flatten();
+        notes.extend(departures.map(|departure| format!("departure from the registered plan: {departure}")));
+        let (illustrations, read) = (Vec::new(), self.files_read(Some(&options.style)));
+        let (threads, recordings) = (self.threads, self.recordings(&manifest));
+        let mut report = Report {
+            results,
+            all,
+            cells,
+            tables,
+            lists,
+            manifest,
+            replies,
+            notes,
+            style,
+            threads,
+            recordings,
+            illustrations,
+            read,
+            inputs: self.inputs.len(),
+        };
+        if let Some(statistics) = &statistics {
+            report.illustrate(statistics)?;
+        }
+        Ok(report)
+    }
+
+    fn recordings(&self, manifest: &Manifest) -> Option<Recordings> {
+        let Source::Traces(_) = &self.source else { return None };
+        // As in manifests: without absolute paths.
+        let named = |path: &PathBuf| bundle::InputFile::new(path, String::new(), 0).path;
+        Some(Recordings {
+            paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
+            definitions: self.question.definitions.as_ref().map(named).filter(|name| name != DEFAULT_DEFINITIONS),
+        })
+    }
+
+    fn notes(&self, results: &Results, lost: &LostCounts) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(undeclared) = undeclared(&results.episodes) {
+            notes.push(undeclared);
+        }
+        notes.extend(registered(&results.episodes));
+        notes.extend(self.source.traces().ok().and_then(|traces| missing_note(traces.files())));
+        if let Source::Traces(set) = &self.source {
+            notes.extend(answered::by_others(set.files()));
+            notes.extend(renderer::told(&renderer::of_files(set.files())));
+        }
+        let total = lost.total();
+        if total > 0 {
+            let counted = match self.question.lost {
+                LostAs::Nothing => "in no denominator (--lost as-failure counts them)",
+                LostAs::Failure => "counted as failures",
+            };
+            notes.push(format!("{}: {counted}; see tables/quality.md", losses::told(total)));
+        }
+        notes
+    }
+}
+
+/// Says whether the analysis matches the plan registered before the recording; `None` without a plan.
+fn registered(episodes: &EpisodeTable) -> Option<String> {
+    let plan = episodes.declared.registration.as_ref()?;
+    let short = |hash: &str| hash.chars().take(12).collect::<String>();
+    let own = &episodes.catalog.hash;
+    let verdict = match &plan.definitions {
+        None => "it names no definitions".to_owned(),
+        Some(hash) if hash == own => "the definitions are those that it names".to_owned(),
+        Some(hash) => format!("the definitions ({}) differ from those that it names ({})", short(own), short(hash)),
+    };
+    Some(format!("the recording follows the registered plan {}: {verdict}", short(&plan.sha256)))
+}
+
+fn undeclared(episodes: &EpisodeTable) -> Option<String> {
+    let lacks = |label: &str| episodes.label(label).is_none();
+    let what = match (lacks("fingerprint"), lacks("scene")) {
+        (true, true) => "what they were recorded with, nor which episodes share a scene",
+        (true, false) => "what they were recorded with",
+        (false, true) => "which episodes share a scene",
+        (false, false) => return None,
+    };
+    Some(format!("the traces do not declare {what}: pooled and unpaired as they are"))
+}
+
+impl Report {
+    /// The first table.
+    pub fn main_table(&self) -> Option<&MetricTable> {
+        self.tables.iter().find(|table| table.name == MAIN_TABLE).or(self.tables.first())
+    }
+
+    /// The metrics that the style does not name, if there are too many for the main table.
+    pub fn other_table(&self) -> Option<&MetricTable> {
+        self.tables.iter().find(|table| table.name == OTHER_TABLE)
+    }
+
+    /// The table of this name. Errors: a name that the style lacks; the error lists its tables.
+    pub fn table(&self, name: &str) -> Result<&MetricTable, StudyError> {
+        self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
+            let known = || self.tables.iter().map(|table| table.name.as_str());
+            let (style, known, hint) =
+                (self.style.name.clone(), known().collect::<Vec<_>>().join(", "), hint(name, known()));
+            StudyError::NoTable { name: name.to_owned(), style, known, hint }
+        })
+    }
+
+    /// A table as Markdown; `None` if the style has no table of this name.
+    pub fn markdown(&self, name: &str) -> Option<String> {
+        self.tables.iter().find(|table| table.name == name).map(|table| table.printed().markdown())
+    }
+
+    /// Writes the folder of the report and replaces an existing report. Errors: `out` is not a folder or cannot be
+    /// written: the folder is then unchanged, or has no manifest. The old report contains a file that this one is made
+    /// from.
+    pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
+        bundle::check_old(out, &self.read)?;
+        replace::check_folder(out, &self.read[..self.inputs]).map_err(BundleError::from)?;
+        let mut episodes = Vec::new();
+        let all = self.all.as_ref().unwrap_or(&self.results.episodes);
+        scores::write(all, Format::Parquet, &mut episodes, self.threads)?;
+        let Self { cells, tables, lists, manifest, illustrations: others, read, .. } = self;
+        let written =
+            bundle::write(out, &Bundle { cells, tables, lists, episodes: &episodes, manifest, read, others })?;
+        let inside = |path: &PathBuf| path.strip_prefix(out).unwrap_or(path).display().to_string();
+        Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
+    }
+
+    fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
+        let drawings = FigureInputs::of_a_report(&self.results, &self.style)?.draw_all();
+        self.notes.extend(drawings.left_out.iter().map(|(name, reason)| format!("no figure `{name}`: {reason}")));
+        self.illustrations = drawings.files()?;
+        if self.results.episodes.len() > MOST_LISTED {
+            self.notes.push(format!("no report.html: it lists at most {MOST_LISTED} episodes"));
+        } else {
+            let bytes = self.page(&drawings, statistics)?.into_bytes();
+            self.illustrations.push(OutputFile { path: "report.html".into(), bytes });
+        }
+        Ok(())
+    }
+
+    fn page(&self, drawings: &Drawings, statistics: &Statistics) -> Result<String, StudyError> {
+        let svgs = drawings.svgs();
+        Ok(html::render(&Page {
+            tables: &self.tables,
+            cells: &self.cells,
+            episodes: &self.results.episodes,
+            manifest: &self.manifest,
+            figures: &drawings.on_page(&svgs),
+            statistics: Some(statistics),
+            lists: &self.lists,
+            recordings: self.recordings.as_ref(),
+        })?)
+    }
+}

@@ -1,0 +1,219 @@
+//! Checks a report's files against its manifest.
+//!
+//! Rule: it never looks outside the folder, whatever the manifest says, and follows no links.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::{self, Metadata};
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::format::counted;
+use mirrorstats_exact::{hash, input};
+use mirrorstats_report::bundle::{MANIFEST, Output};
+
+/// The largest manifest that is read, in bytes; the paper's has 20 KB.
+const LONGEST: u64 = 64 << 20;
+
+/// The needed part of a manifest; other versions may have more fields.
+#[derive(Deserialize)]
+struct Listed {
+    #[serde(default)]
+    outputs: Vec<Output>,
+    /// Only distinguishes a report's manifest from other files of that name.
+    #[serde(rename = "schema_version")]
+    _schema_version: u32,
+}
+
+/// The result of verifying a report's folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Verification {
+    /// The number of files in the manifest.
+    pub files: usize,
+    /// Files that are not as the manifest says, by path.
+    pub differences: Vec<Difference>,
+}
+
+/// A file that is not as the manifest says.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Difference {
+    /// The path inside the folder, `/` between its parts.
+    pub path: String,
+    /// The kind of problem.
+    pub kind: Kind,
+    /// The expected value.
+    pub expected: String,
+    /// The value found.
+    pub found: String,
+}
+
+/// The kind of a file's problem.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// It has another content, or is no file.
+    Changed,
+    /// The manifest lists it, and it is not there.
+    Missing,
+    /// It is there, and the manifest does not list it.
+    Unexpected,
+}
+
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    #[error("{}: expected a report's folder with its {MANIFEST}, found {found}; name the folder that `mirrorstats report` wrote", path.display())]
+    NoManifest { path: PathBuf, found: String },
+    #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
+    Malformed { path: PathBuf, found: String },
+    #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
+    Unreadable { path: PathBuf, source: io::Error },
+}
+
+pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
+    let listed = listed(folder)?;
+    let mut there = BTreeMap::new();
+    find(folder, "", &mut there)?;
+    let mut differences = Vec::new();
+    for (path, output) in &listed {
+        differences.extend(difference(folder, path, output, there.remove(path))?);
+    }
+    there.remove(MANIFEST);
+    differences.extend(there.into_iter().map(|(path, found)| Difference {
+        path,
+        kind: Kind::Unexpected,
+        expected: "no such file".to_owned(),
+        found: kind_of(&found).to_owned(),
+    }));
+    differences.sort_by(|a, b| a.path.cmp(&b.path));
+    Ok(Verification { files: listed.len(), differences })
+}
+
+fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
+    let path = folder.join(MANIFEST);
+    let none = |found: String| VerifyError::NoManifest { path: folder.to_owned(), found };
+    let about = fs::symlink_metadata(&path).map_err(|error| none(error.to_string()))?;
+    if !about.is_file() {
+        return Err(none(kind_of(&about).to_owned()));
+    }
+    let malformed = |found: String| VerifyError::Malformed { path: path.clone(), found };
+    if about.len() > LONGEST {
+        return Err(malformed(format!("{} bytes, more than {LONGEST}", about.len())));
+    }
+    let bytes = fs::read(&path).map_err(|source| VerifyError::Unreadable { path: path.clone(), source })?;
+    let manifest: Listed = serde_json::from_slice(&bytes).map_err(|error| malformed(error.to_string()))?;
+    if manifest.outputs.is_empty() {
+        return Err(malformed("one that lists no outputs, as those of earlier versions".to_owned()));
+    }
+    let mut listed = BTreeMap::new();
+    for output in manifest.outputs {
+        if let Some(found) = fault(&output) {
+            return Err(malformed(found));
+        }
+        if let Some(twice) = listed.insert(output.path.clone(), output) {
+            return Err(malformed(format!("`{}` twice among its outputs", visible(&twice.path))));
+        }
+    }
+    Ok(listed)
+}
+
+fn fault(output: &Output) -> Option<String> {
+    let shown = visible(&output.path);
+    let is_plain = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
+    if !output.path.split('/').all(is_plain) {
+        return Some(format!("the output `{shown}`, which is not a path inside its folder"));
+    }
+    if output.path == MANIFEST {
+        return Some(format!("`{MANIFEST}` among its outputs"));
+    }
+    let is_hash = output.sha256.len() == 64 && output.sha256.bytes().all(|digit| digit.is_ascii_hexdigit());
+    (!is_hash).then(|| format!("the output `{shown}` with `{}` in place of a SHA-256", visible(&output.sha256)))
+}
+
+/// Collects everything in a folder except folders, by relative path.
+fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> Result<(), VerifyError> {
+    let unreadable = |path: &Path| {
+        let path = path.to_owned();
+        move |source| VerifyError::Unreadable { path, source }
+    };
+    for entry in fs::read_dir(folder).map_err(unreadable(folder))? {
+        let entry = entry.map_err(unreadable(folder))?;
+        let path = format!("{inside}{}", entry.file_name().to_string_lossy());
+        let about = fs::symlink_metadata(entry.path()).map_err(unreadable(&entry.path()))?;
+        if about.is_dir() {
+            find(&entry.path(), &format!("{path}/"), there)?;
+        } else {
+            there.insert(path, about);
+        }
+    }
+    Ok(())
+}
+
+fn difference(
+    folder: &Path,
+    path: &str,
+    output: &Output,
+    there: Option<Metadata>,
+) -> Result<Option<Difference>, VerifyError> {
+    let expected = format!("{} bytes with the SHA-256 {}", output.bytes, output.sha256);
+    let differs =
+        |kind, found: String| Ok(Some(Difference { path: path.to_owned(), kind, expected: expected.clone(), found }));
+    let Some(about) = there else { return differs(Kind::Missing, "no such file".to_owned()) };
+    if !about.is_file() {
+        return differs(Kind::Changed, kind_of(&about).to_owned());
+    }
+    let at = folder.join(path);
+    let found =
+        input::open(&at).and_then(hash::of_reader).map_err(|source| VerifyError::Unreadable { path: at, source })?;
+    if found == output.sha256.to_ascii_lowercase() && about.len() == output.bytes {
+        return Ok(None);
+    }
+    differs(Kind::Changed, format!("{} bytes with the SHA-256 {found}", about.len()))
+}
+
+fn kind_of(about: &Metadata) -> &'static str {
+    match about.file_type() {
+        kind if kind.is_symlink() => "a symbolic link",
+        kind if kind.is_dir() => "a folder",
+        kind if kind.is_file() => "a file",
+        _ => "neither a file nor a folder",
+    }
+}
+
+impl Verification {
+    pub fn holds(&self) -> bool {
+        self.differences.is_empty()
+    }
+
+    fn count(&self, kind: Kind) -> usize {
+        self.differences.iter().filter(|difference| difference.kind == kind).count()
+    }
+}
+
+impl fmt::Display for Verification {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Difference { path, kind, expected, found } in &self.differences {
+            let path = visible(path);
+            match kind {
+                Kind::Changed => writeln!(f, "{path}: changed; expected {expected}, found {found}")?,
+                Kind::Missing => writeln!(f, "{path}: missing; expected {expected}")?,
+                Kind::Unexpected => writeln!(f, "{path}: unexpected; the manifest does not list it")?,
+            }
+        }
+        let files = self.files;
+        if self.holds() {
+            let verb = if files == 1 { "is" } else { "are" };
+            return write!(f, "{} {verb} as the manifest says", counted(files as u64, "file"));
+        }
+        let [changed, missing, unexpected] =
+            [Kind::Changed, Kind::Missing, Kind::Unexpected].map(|kind| self.count(kind));
+        write!(
+            f,
+            "{} in the manifest: {changed} changed, {missing} missing, {unexpected} unexpected",
+            counted(files as u64, "file")
+        )
+    }
+}

@@ -1,0 +1,153 @@
+//! The requested and the actual results of a scan, and the best models in them.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+use mirrorstats_metric::catalogs::catalog::Better;
+use mirrorstats_report::bundle;
+use mirrorstats_report::cells::group::CONDITION;
+use mirrorstats_report::figures::e5_outcomes::Outcomes;
+use mirrorstats_report::figures::{FigureName, gaze};
+use mirrorstats_score::quality::QualityByCell;
+use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
+use mirrorstats_score::timeline::Timeline;
+use mirrorstats_trace::episodes::replies::REPLY_STATUS;
+use mirrorstats_trace::read::open::TraceSet;
+
+/// The requested results besides the episode table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each output is asked for by itself")]
+pub struct Outputs {
+    /// Times of looks, claims and decisions, for the figure `gaze`.
+    pub timelines: bool,
+    /// Endings of open questions, for the figure `e5-outcomes`.
+    pub outcomes: bool,
+    /// The episodes that the infrastructure ended.
+    pub losses: bool,
+    pub quality: bool,
+    /// The hashes of the inputs.
+    pub hashes: bool,
+}
+
+impl Outputs {
+    /// The inputs of these figures.
+    pub fn of_figures(names: &[FigureName]) -> Self {
+        let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
+        Self { timelines, outcomes, ..Self::default() }
+    }
+
+    pub(crate) fn needs_steps(self, traces: &TraceSet) -> bool {
+        let has_losses = self.losses && traces.column(REPLY_STATUS).is_some();
+        self.timelines || self.outcomes || self.quality || has_losses
+    }
+}
+
+/// The results of a scan.
+#[derive(Clone, Debug)]
+pub struct Results {
+    /// One row per episode.
+    pub episodes: EpisodeTable,
+    /// One timeline per episode, in table order. `None` if not requested, for scores, for definitions that do not name
+    /// the moments, and for more episodes than `gaze` draws.
+    pub timelines: Option<Vec<Timeline>>,
+    /// The endings of open questions. `None` if not requested, and if there is no such question.
+    pub outcomes: Option<Outcomes>,
+    /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` if not requested,
+    /// and if the inputs do not record it.
+    pub lost: Option<BTreeSet<String>>,
+    /// The reply quality by cell, lost episodes included. `None` if not requested, and for scores.
+    pub quality: Option<QualityByCell>,
+    /// The inputs with their hashes; empty if not requested.
+    pub inputs: Vec<bundle::InputFile>,
+}
+
+impl Results {
+    pub(crate) fn of(episodes: EpisodeTable) -> Self {
+        let (timelines, outcomes, lost, quality, inputs) = (None, None, None, None, Vec::new());
+        Self { episodes, timelines, outcomes, lost, quality, inputs }
+    }
+
+    /// The same results, with a non-default condition in the model's name: `model [condition]`.
+    pub(crate) fn with_conditions_as_models(&self) -> Cow<'_, Self> {
+        if !self.episodes.has_conditions() {
+            return Cow::Borrowed(self);
+        }
+        let (episodes, order) = self.episodes.with_labelled_models(CONDITION);
+        let timelines = self.timelines.as_ref();
+        let timelines = timelines.map(|timelines| {
+            let of = |(row, was): (usize, &usize)| {
+                let model = episodes.keys.get(row).model.to_owned();
+                let line = timelines[*was].clone();
+                Timeline { key: EpisodeKey { model, ..line.key.clone() }, ..line }
+            };
+            order.iter().enumerate().map(|(row, was)| of((row, was))).collect()
+        });
+        Cow::Owned(Self { episodes, timelines, ..self.clone() })
+    }
+
+    pub(crate) fn select(&mut self, outputs: Outputs) {
+        if outputs.outcomes && Outcomes::are_there(&self.episodes) {
+            let shown = self.with_conditions_as_models();
+            let answered =
+                shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
+            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&shown.episodes, &answered));
+            self.outcomes = outcomes;
+        }
+        if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
+            self.timelines = None;
+        }
+    }
+
+    /// The results of the `most` best models by a metric.
+    pub(crate) fn of_the_best(self, most: usize, metric: &str) -> Self {
+        let episodes = &self.episodes;
+        let Some(column) = episodes.metric(metric) else { return self };
+        let mut means = model_means(episodes, column);
+        if episodes.catalog.metric.get(metric).is_some_and(|metric| metric.better == Better::Lower) {
+            means.sort_by(|a, b| b.experiments.len().cmp(&a.experiments.len()).then(a.mean.total_cmp(&b.mean)));
+        }
+        let kept: BTreeSet<&str> = means.iter().take(most).map(|mean| mean.model).collect();
+        let is_kept = |row: &usize| kept.contains(episodes.keys.get(*row).model);
+        let rows: Vec<usize> = (0..episodes.len()).filter(is_kept).collect();
+        let timelines = self.timelines.as_ref().map(|lines| rows.iter().map(|row| lines[*row].clone()).collect());
+        let outcomes = self.outcomes.clone().map(|Outcomes { experiment, mut rows }| {
+            rows.retain(|row| kept.contains(row.model.as_str()));
+            Outcomes { experiment, rows }
+        });
+        Self { episodes: episodes.taken(&rows), timelines, outcomes, ..self }
+    }
+}
+
+/// The mean of a model over experiments, each with equal weight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelMean<'t> {
+    pub model: &'t str,
+    pub mean: f64,
+    pub experiments: BTreeMap<&'t str, f64>,
+}
+
+/// The models by their means, the largest first. Models that lack experiments come last, since their means are not
+/// comparable. This is an initial order, not a test.
+pub fn model_means<'t>(episodes: &'t EpisodeTable, metric: &MetricColumn) -> Vec<ModelMean<'t>> {
+    let mut sums: BTreeMap<&'t str, BTreeMap<&'t str, (i128, u32)>> = BTreeMap::new();
+    for (key, value) in episodes.keys.iter().zip(metric.iter()) {
+        let Some(value) = value else { continue };
+        let (sum, count) = sums.entry(key.model).or_default().entry(key.experiment).or_default();
+        (*sum, *count) = (*sum + i128::from(value), *count + 1);
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a mean that puts models in an order")]
+    let mean = |(experiment, (sum, count)): (&'t str, (i128, u32))| (experiment, sum as f64 / f64::from(count));
+    let mut models: Vec<_> = sums
+        .into_iter()
+        .map(|(model, of)| {
+            let experiments: BTreeMap<&str, f64> = of.into_iter().map(mean).collect();
+            let count = u32::try_from(experiments.len()).unwrap_or(u32::MAX);
+            ModelMean { model, mean: experiments.values().sum::<f64>() / f64::from(count), experiments }
+        })
+        .collect();
+    models.sort_by(|a, b| {
+        let by_mean = || b.mean.total_cmp(&a.mean).then(a.model.cmp(b.model));
+        b.experiments.len().cmp(&a.experiments.len()).then_with(by_mean)
+    });
+    models
+}

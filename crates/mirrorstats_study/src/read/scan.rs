@@ -1,0 +1,174 @@
+//! The one scan of the inputs, and all its results.
+
+use std::collections::BTreeSet;
+use std::thread;
+
+use crate::backend::SparkJob;
+use crate::error::StudyError;
+use crate::inputs::{self, Source};
+use crate::question::STANDING_LABELS;
+use crate::results::{Outputs, Results};
+use crate::{Backend, Study, losses, own_definitions, scores};
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_report::cells::group::CONDITION;
+use mirrorstats_score::quality::{QualityByCell, QualityReader};
+use mirrorstats_score::score_traces::{self, Scored};
+use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, LabelColumn};
+use mirrorstats_score::vocabulary;
+use mirrorstats_statistics::losses::INFRASTRUCTURE;
+use mirrorstats_trace::episodes::labels::PREFIX;
+use mirrorstats_trace::episodes::replies::REPLY_STATUS;
+use mirrorstats_trace::footers::declared::Declared;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::schema::{self, Column, Domain};
+
+impl Study {
+    /// Reads the inputs once. A file that changed since it was opened is an error. Errors: faults of the traces or the
+    /// scores; numbers beyond 64 bits; a file that changed in between.
+    pub fn scan(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let (results, inputs) = thread::scope(|scope| {
+            // Hashing reads the same pages; on its own thread it does not slow the scan.
+            let hashing = outputs.hashes.then(|| scope.spawn(|| inputs::hashes(&self.inputs)));
+            let results = self.scan_rows(outputs);
+            let inputs = hashing.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            (results, inputs)
+        });
+        // A changed file explains any other error.
+        self.check_unchanged()?;
+        let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
+        self.declare(&mut results)?;
+        results.quality = results.quality.filter(|_| outputs.quality);
+        Ok(results)
+    }
+
+    /// Returns true if the traces record replies, or episodes were lost. Errors: scores, which have no replies; a list
+    /// of lost episodes that cannot be read.
+    pub fn has_quality(&self) -> Result<bool, StudyError> {
+        let reader = QualityReader::of(self.source.traces()?);
+        Ok(!reader.columns().is_empty() || !mirrorstats_trace::episodes::lost::beside(&self.inputs)?.is_empty())
+    }
+
+    /// The reply quality of all episodes, lost ones included. Errors: scores, which have no replies; faults of the
+    /// traces or of the list of lost episodes.
+    pub fn quality(&self) -> Result<QualityByCell, StudyError> {
+        let traces = self.source.traces()?;
+        let reader = QualityReader::of(traces);
+        let columns = vocabulary::trace_columns(traces);
+        let all = Definitions::from_toml("all", "open = true", &columns)?;
+        let nobody = all.clone().filtered("nobody", "false", &columns)?;
+        let lost = lost_episodes(traces)?;
+        let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
+        let wanted =
+            score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader), unchecked: &UNCHECKED };
+        let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
+        let Scored { tables: [episodes, ended], quality, .. } =
+            score_traces::score_each(traces, definitions, wanted, self.threads)?;
+        let lost = lost.map(|_| ids(&ended));
+        let mut results = Results { lost, quality, ..Results::of(episodes) };
+        self.declare(&mut results)?;
+        self.check_unchanged()?;
+        Ok(results.quality.unwrap_or_default())
+    }
+
+    pub(crate) fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
+        if let Source::Traces(traces) = &self.source {
+            let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
+            let losses_recorded = results.lost.is_some();
+            results.episodes.declared = Declared { unrecorded, losses_recorded, ..Declared::of(traces) };
+        }
+        let asked = self.question.labels();
+        results.episodes.labels.retain(|label| asked.contains(&label.name) || says_something(label));
+        losses::label(results);
+        Ok(())
+    }
+
+    /// Returns true if the definitions or the filter read coders' labels. Errors: scores in the place of traces; every
+    /// fault of the definitions.
+    pub fn reads_labels(&self) -> Result<bool, StudyError> {
+        let traces = self.traces()?;
+        let plan = self.question.bind(traces)?.plan;
+        Ok(plan.columns(&plan.needed()).iter().any(|(name, _)| traces.is_label_column(name)))
+    }
+
+    /// The results of an earlier scan with the current coders' labels. Errors: scores in the place of traces.
+    pub fn relabelled(&self, mut results: Results) -> Result<Results, StudyError> {
+        let traces = self.traces()?;
+        let EpisodeTable { labels, keys, .. } = &mut results.episodes;
+        labels.retain(|label| !label.name.starts_with(PREFIX));
+        labels.extend(traces.label_columns().iter().map(|name| {
+            let value = |key: KeyRef<'_>| traces.labels().value(name, key.episode_id).map(|is| is.to_string());
+            LabelColumn { name: name.clone(), values: keys.iter().map(value).collect() }
+        }));
+        Ok(results)
+    }
+
+    fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let mut results = match (&self.source, &self.backend) {
+            (Source::Scores(files), Backend::Native) => Results::of(scores::read(files, &self.question)?),
+            (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
+            (source, Backend::Spark(cluster)) => {
+                let scored = Results::of(SparkJob::of_study(self, cluster.clone())?.score()?);
+                if let Source::Traces(traces) = source {
+                    own_definitions::check(&self.question.bind(traces)?, traces, &scored.episodes)?;
+                }
+                // The other engine computes only scores; the other outputs come from a scan.
+                match source {
+                    Source::Traces(traces) if outputs.needs_steps(traces) => {
+                        Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
+                    }
+                    _ => scored,
+                }
+            }
+        };
+        results.select(outputs);
+        Ok(results)
+    }
+
+    fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
+        let labels = self.question.labels_over(traces);
+        let definitions = self.question.bind(traces)?;
+        let statuses = outputs.losses.then(|| QualityReader::of_statuses(traces));
+        let statuses = statuses.filter(|reader| !reader.columns().is_empty());
+        let reader = outputs.quality.then(|| QualityReader::of(traces)).or(statuses);
+        let timelines = outputs.timelines || outputs.outcomes;
+        let quality = reader.as_ref();
+        let wanted = score_traces::Outputs { labels: &labels, timelines, quality, unchecked: &UNCHECKED };
+        let lost = if outputs.losses { lost_episodes(traces)? } else { None };
+        let all: Vec<&Definitions> = std::iter::once(&definitions).chain(&lost).collect();
+        let Scored { tables, timelines, quality } = score_traces::score_all(traces, &all, wanted, self.threads)?;
+        let mut tables = tables.into_iter();
+        let episodes = tables.next().expect("a table per definitions");
+        own_definitions::check(&definitions, traces, &episodes)?;
+        let lost = tables.next().map(|table| ids(&table));
+        Ok(Results { timelines, lost, quality, ..Results::of(episodes) })
+    }
+}
+
+pub(crate) fn ids(table: &EpisodeTable) -> BTreeSet<String> {
+    table.keys.iter().map(|key| key.episode_id.to_owned()).collect()
+}
+
+fn says_something(label: &LabelColumn) -> bool {
+    let default = schema::column(&label.name).and_then(Column::default_text);
+    !STANDING_LABELS.contains(&label.name.as_str()) || label.values.iter().any(|text| text.is_some() && text != default)
+}
+
+/// Columns that are read beyond those of the definitions: invalid values in them do not prevent scoring.
+const UNCHECKED: [&str; 1] = [REPLY_STATUS];
+
+/// Episodes that the infrastructure ended: without `done`, their last reply lost. `None` if the traces do not record
+/// it.
+pub(crate) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
+    let status = traces.column("reply_status");
+    if traces.domain() == Domain::Own
+        || status.is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some())
+    {
+        return Ok(None);
+    }
+    let columns = vocabulary::trace_columns(traces);
+    let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
+    let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
+    // No metric and every experiment: only the filter is needed.
+    let nothing = Definitions::from_toml("losses", "open = true", &columns)?;
+    Ok(Some(nothing.filtered("losses", &ended, &columns)?))
+}

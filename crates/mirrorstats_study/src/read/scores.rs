@@ -1,0 +1,84 @@
+//! Reads files of scores instead of traces, joins and filters them; and writes them.
+
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use crate::Question;
+use crate::error::StudyError;
+use crate::inputs::ScoreFile;
+use mirrorstats_exact::input;
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_score::format::{self, Format, Partition};
+use mirrorstats_score::tables::declared_experiments::Declarations;
+use mirrorstats_score::tables::select::select;
+use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::vocabulary;
+use mirrorstats_trace::inputs;
+use mirrorstats_trace::read::in_order::in_order;
+
+/// The episodes of some files as one table, filtered by the question.
+pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTable, StudyError> {
+    let (mut whole, mut declarations) = (None::<EpisodeTable>, Declarations::default());
+    for file in files {
+        let table = read_one(file, question)?;
+        for (name, experiment) in table.catalog.declared() {
+            declarations.add(&file.input.name, &name, experiment)?;
+        }
+        whole = Some(match whole {
+            None => table,
+            Some(whole) => whole.joined(&table).map_err(|error| StudyError::file(&file.input.name, error))?,
+        });
+    }
+    let table = whole.ok_or(StudyError::NoScores)?;
+    Ok(select(table, question.metrics.as_deref(), question.filter.as_deref())?)
+}
+
+fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, StudyError> {
+    let failed = |error| StudyError::file(&file.input.name, error);
+    let bytes = input::open(&file.input.path).map_err(|error| StudyError::file(&file.input.name, error))?;
+    let named = || Definitions::load(question.definitions_name(), &vocabulary::schema_columns());
+    if file.format != Format::Parquet {
+        return format::read_text(file.format, &named()?.catalog, bytes).map_err(failed);
+    }
+    let named = if file.carries_definitions { None } else { Some(named()?.catalog) };
+    let folders = inputs::folder_values(&file.input.path);
+    let partition = Partition { folders: &folders, definitions: named.as_ref() };
+    let table = format::read_parquet(bytes, &partition).map_err(failed)?;
+    match &question.definitions {
+        Some(name) => under(name, file, table),
+        None => Ok(table),
+    }
+}
+
+/// Scores keep the definitions that they were computed with; requesting others is an error.
+fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
+    let wanted = Definitions::load(name, &vocabulary::schema_columns())?.catalog;
+    if wanted.hash == table.catalog.hash {
+        return Ok(table);
+    }
+    let short = |hash: &str| hash.get(..12).unwrap_or_default().to_owned();
+    Err(StudyError::OtherDefinitions {
+        file: file.input.name.clone(),
+        wanted: name.display().to_string(),
+        wanted_hash: short(&wanted.hash),
+        found: table.catalog.name.clone(),
+        found_hash: short(&table.catalog.hash),
+    })
+}
+
+/// Writes a table; Parquet is encoded by `threads` threads.
+pub fn write(
+    table: &EpisodeTable,
+    format: Format,
+    out: impl Write + Send,
+    threads: NonZeroUsize,
+) -> Result<(), StudyError> {
+    if format != Format::Parquet {
+        return Ok(format::write(table, format, out)?);
+    }
+    let (encoder, mut writer) = format::parquet::encoder(table, out)?;
+    let jobs: Vec<_> = encoder.jobs().collect();
+    in_order(threads, &jobs, |job| encoder.encode(*job), |column| writer.append(column?))?;
+    Ok(writer.finish()?)
+}

@@ -1,0 +1,378 @@
+//! `labels.jsonl` beside the traces: the labels and notes of coders, one JSON object per line.
+//!
+//! Rule: the list only grows. A later line replaces an earlier one of the same coder, episode, step and label, so two
+//! lists can be concatenated.
+
+mod line;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::fs::OpenOptions;
+use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write as _};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mirrorstats_exact::budget::{Budget, Limit};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::input;
+use mirrorstats_exact::replace::NewFile;
+
+use crate::inputs::Input;
+use line::LONGEST_LINE;
+pub use line::{InvalidLabel, LabelLine, LabelsError, check_coder};
+
+/// The prefix of column names: the label `confabulates` is the column `label_confabulates`.
+pub const PREFIX: &str = "label_";
+
+const MOST_LINES: Limit = Limit::new("lines in a list of labels", 2_000_000);
+const MOST_NOTES: Limit = Limit::new("bytes of notes in a list of labels", 32 << 20);
+const MOST_CODERS: Limit = Limit::new("coders in a list of labels", 1000);
+const MOST_WORDS: Limit = Limit::new("different labels in a list of labels", 200);
+
+/// The folder of a recording's complete episodes that are not in its trace yet.
+const PARTS: &str = ".parts";
+
+/// The list beside a trace: in the trace's folder, or in the recording's.
+pub fn list_beside(trace: &Path) -> PathBuf {
+    let folder = trace.parent().unwrap_or(Path::new(""));
+    let recording = folder.parent().filter(|_| folder.ends_with(PARTS));
+    recording.unwrap_or(folder).join("labels.jsonl")
+}
+
+pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
+    let failed = |source| LabelsError::Write { path: list.to_owned(), source };
+    let mut file = OpenOptions::new().create(true).append(true).read(true).open(list).map_err(failed)?;
+    let mut text = serde_json::to_string(line).map_err(io::Error::from).map_err(failed)?;
+    text.push('\n');
+    // A list edited by hand may end without a line feed.
+    if file.seek(SeekFrom::End(0)).map_err(failed)? > 0 {
+        let mut end = [0];
+        file.seek(SeekFrom::End(-1)).and_then(|_| file.read_exact(&mut end)).map_err(failed)?;
+        if end != *b"\n" {
+            text.insert(0, '\n');
+        }
+    }
+    // A single write, so that lines of several programs do not mix.
+    file.write_all(text.as_bytes()).map_err(failed)
+}
+
+/// Removes all lines about some episodes and returns their number. No program may add lines meanwhile.
+pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, LabelsError> {
+    let reading = |source| LabelsError::Read { path: list.to_owned(), source };
+    let writing = |source| LabelsError::Write { path: list.to_owned(), source };
+    let lines = match input::lines(list, LONGEST_LINE) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
+        lines => lines.map_err(reading)?,
+    };
+    let mut file = NewFile::create(list).map_err(writing)?;
+    let mut kept = BufWriter::new(file.as_file_mut());
+    let mut removed = 0;
+    for line in lines {
+        let line = line.map_err(reading)?;
+        // Invalid labels of these episodes go too.
+        let label: serde_json::Value = serde_json::from_slice(&line).unwrap_or_default();
+        if label["episode_id"].as_str().is_some_and(|id| episodes.contains(id)) {
+            removed += 1;
+        } else {
+            kept.write_all(&line).map_err(writing)?;
+        }
+    }
+    kept.flush().map_err(writing)?;
+    drop(kept);
+    if removed > 0 {
+        file.commit().map_err(writing)?;
+    }
+    Ok(removed)
+}
+
+/// A coder's mark on an episode or a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark<'l> {
+    pub coder: &'l str,
+    /// `None` for the whole episode.
+    pub step: Option<u32>,
+    /// `None` if the coder looked and gave no label.
+    pub label: Option<&'l str>,
+    pub note: Option<&'l str>,
+}
+
+/// The labels beside some traces. A million lines take about 30 MB.
+#[derive(Clone, Debug, Default)]
+pub struct Labels {
+    episodes: Names,
+    coders: Names,
+    words: Names,
+    /// In order, one per key.
+    marks: Vec<Entry>,
+    notes: Vec<Box<str>>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Names {
+    all: Vec<Arc<str>>,
+    numbers: HashMap<Arc<str>, u32>,
+}
+
+/// The step is 0 for the whole episode; the word is [`NONE`] without a label.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    episode: u32,
+    step: u32,
+    word: u16,
+    coder: u16,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    key: Key,
+    state: State,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Removed,
+    Plain,
+    Note(u32),
+}
+
+const NONE: u16 = u16::MAX;
+
+impl Names {
+    fn number(&mut self, text: &str) -> u32 {
+        if let Some(number) = self.numbers.get(text) {
+            return *number;
+        }
+        let number = u32::try_from(self.all.len()).unwrap_or(u32::MAX);
+        let text: Arc<str> = text.into();
+        self.all.push(Arc::clone(&text));
+        self.numbers.insert(text, number);
+        number
+    }
+
+    fn get(&self, number: impl Into<u32>) -> &str {
+        usize::try_from(number.into()).ok().and_then(|at| self.all.get(at)).map_or("", |text| text)
+    }
+}
+
+fn narrow(number: u32) -> u16 {
+    u16::try_from(number).unwrap_or(NONE)
+}
+
+impl Labels {
+    /// The labels in the lists beside some traces; empty without lists.
+    pub fn beside(traces: &[Input]) -> Result<Self, LabelsError> {
+        let mut labels = Self::default();
+        let lists: BTreeSet<PathBuf> = traces.iter().map(|input| list_beside(&input.path)).collect();
+        for list in lists {
+            labels.read(&list)?;
+        }
+        Ok(labels.in_order())
+    }
+
+    fn read(&mut self, list: &Path) -> Result<(), LabelsError> {
+        let failed = |source| LabelsError::Read { path: list.to_owned(), source };
+        let lines = match input::lines(list, LONGEST_LINE) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            lines => lines.map_err(failed)?,
+        };
+        let exceeded = |source| LabelsError::Budget { path: list.to_owned(), source };
+        let notes = Budget::new(MOST_NOTES);
+        for (at, line) in lines.enumerate() {
+            MOST_LINES.check(at as u64 + 1).map_err(exceeded)?;
+            let line = line.map_err(failed)?;
+            if line.trim_ascii().is_empty() {
+                continue;
+            }
+            let wrong = |problem| LabelsError::Line { path: list.to_owned(), line: at + 1, problem };
+            let line: LabelLine = serde_json::from_slice(&line).map_err(|error| {
+                let found = error.to_string();
+                let found = found.split(" at line ").next().unwrap_or_default();
+                wrong(format!(
+                    "expected a label: `coder`, `episode_id`, `step`, `label`, `note`, found {}",
+                    visible(found)
+                ))
+            })?;
+            line.check().map_err(|invalid| wrong(invalid.to_string()))?;
+            notes.spend(line.note.as_ref().map_or(0, |note| note.len() as u64)).map_err(exceeded)?;
+            self.add(&line);
+            MOST_CODERS.check(self.coders.all.len() as u64).map_err(exceeded)?;
+            MOST_WORDS.check(self.words.all.len() as u64).map_err(exceeded)?;
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, line: &LabelLine) {
+        let word = line.label.as_deref().map_or(NONE, |word| narrow(self.words.number(word)));
+        let coder = narrow(self.coders.number(&line.coder));
+        let key = Key { episode: self.episodes.number(&line.episode_id), step: line.step.unwrap_or(0), word, coder };
+        let note = line.note.as_deref().filter(|note| !note.is_empty());
+        let state = match (line.removed, note) {
+            (true, _) => State::Removed,
+            (false, None) => State::Plain,
+            (false, Some(note)) => {
+                self.notes.push(note.into());
+                State::Note(u32::try_from(self.notes.len() - 1).unwrap_or(u32::MAX))
+            }
+        };
+        self.marks.push(Entry { key, state });
+    }
+
+    /// Keeps the last line of each key, and only the notes in use.
+    fn in_order(mut self) -> Self {
+        self.marks.sort_by_key(|entry| entry.key);
+        let mut kept: Vec<Entry> = Vec::new();
+        for entry in self.marks.drain(..) {
+            match kept.last_mut() {
+                Some(last) if last.key == entry.key => *last = entry,
+                _ => kept.push(entry),
+            }
+        }
+        kept.retain(|entry| entry.state != State::Removed);
+        let mut notes = Vec::new();
+        for entry in &mut kept {
+            let State::Note(number) = &mut entry.state else { continue };
+            notes.push(std::mem::take(&mut self.notes[*number as usize]));
+            *number = u32::try_from(notes.len() - 1).unwrap_or(u32::MAX);
+        }
+        kept.shrink_to_fit();
+        Self { marks: kept, notes, ..self }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.marks.is_empty()
+    }
+
+    /// The labels in use, in alphabetical order.
+    pub fn words(&self) -> BTreeSet<&str> {
+        let used: BTreeSet<u16> = self.marks.iter().map(|entry| entry.key.word).filter(|word| *word != NONE).collect();
+        used.into_iter().map(|word| self.words.get(word)).collect()
+    }
+
+    pub fn columns(&self) -> Vec<String> {
+        self.words().into_iter().map(|word| format!("{PREFIX}{word}")).collect()
+    }
+
+    pub fn episodes(&self) -> impl Iterator<Item = &str> {
+        let mut last = None;
+        let numbers = self.marks.iter().map(|entry| entry.key.episode);
+        numbers.filter(move |number| last.replace(*number) != Some(*number)).map(|number| self.episodes.get(number))
+    }
+
+    /// The marks of an episode: its own, then those of its steps.
+    pub fn of_episode(&self, id: &str) -> impl Iterator<Item = Mark<'_>> {
+        self.marks[self.range(id)].iter().map(|entry| self.mark(entry))
+    }
+
+    /// The value of a column: true if a coder gave the label to the episode or a step, false if coders gave only
+    /// others, null if no coder saw the episode.
+    pub fn value(&self, column: &str, id: &str) -> Option<bool> {
+        let number = column.strip_prefix(PREFIX).and_then(|word| self.words.numbers.get(word));
+        let word = number.map_or(NONE, |number| narrow(*number));
+        let marks = &self.marks[self.range(id)];
+        (!marks.is_empty()).then(|| word != NONE && marks.iter().any(|entry| entry.key.word == word))
+    }
+
+    /// The labels of each coder by episode; an empty set if the coder gave none.
+    pub fn by_coder(&self) -> BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> {
+        let mut coders: BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> = BTreeMap::new();
+        for entry in &self.marks {
+            let Mark { coder, label, .. } = self.mark(entry);
+            let episodes = coders.entry(coder).or_default();
+            episodes.entry(self.episodes.get(entry.key.episode)).or_default().extend(label);
+        }
+        coders
+    }
+
+    fn range(&self, id: &str) -> Range<usize> {
+        let Some(number) = self.episodes.numbers.get(id) else { return 0..0 };
+        let start = self.marks.partition_point(|entry| entry.key.episode < *number);
+        start..self.marks.partition_point(|entry| entry.key.episode <= *number)
+    }
+
+    fn mark(&self, entry: &Entry) -> Mark<'_> {
+        let Key { step, word, coder, .. } = entry.key;
+        let note = match entry.state {
+            State::Note(number) => self.notes.get(number as usize).map(|note| &**note),
+            State::Plain | State::Removed => None,
+        };
+        let label = (word != NONE).then(|| self.words.get(word));
+        Mark { coder: self.coders.get(coder), step: (step > 0).then_some(step), label, note }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LabelLine, Labels, Mark, append, list_beside};
+    use crate::inputs::Input;
+    use std::path::Path;
+
+    fn line(coder: &str, step: Option<u32>, label: Option<&str>, note: Option<&str>) -> LabelLine {
+        let [label, note] = [label, note].map(|text| text.map(str::to_owned));
+        LabelLine { coder: coder.into(), episode_id: "E1/m/s1/r1".into(), step, label, note, removed: false }
+    }
+
+    fn read(text: &str) -> Result<Labels, String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("labels.jsonl"), text).unwrap();
+        Labels::beside(&[Input::new(folder.path().join("a.parquet"))]).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_later_line_replaces_an_earlier_one_and_a_removal_takes_it_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let inputs = ["a.parquet", ".parts/b.parquet"].map(|name| Input::new(folder.path().join(name)));
+        let list = list_beside(&inputs[0].path);
+        assert_eq!(list, list_beside(&inputs[1].path));
+        assert!(Labels::beside(&inputs).unwrap().is_empty());
+        std::fs::write(&list, r#"{"coder":"bob","episode_id":"E1/m/s2/r1"}"#).unwrap();
+        append(&list, &line("ann", None, Some("confabulates"), Some("first"))).unwrap();
+        append(&list, &line("ann", Some(3), Some("loops"), None)).unwrap();
+        append(&list, &line("ann", None, Some("confabulates"), Some("second"))).unwrap();
+        let labels = Labels::beside(&inputs).unwrap();
+        let marks: Vec<Mark<'_>> = labels.of_episode("E1/m/s1/r1").collect();
+        let expected = [(None, Some("confabulates"), Some("second")), (Some(3), Some("loops"), None)];
+        assert_eq!(marks, expected.map(|(step, label, note)| Mark { coder: "ann", step, label, note }));
+        assert_eq!(labels.columns(), ["label_confabulates", "label_loops"]);
+        let value = |column, episode| labels.value(column, episode);
+        assert_eq!(value("label_loops", "E1/m/s1/r1"), Some(true));
+        assert_eq!(value("label_loops", "E1/m/s2/r1"), Some(false), "bob looked and puts no label");
+        assert_eq!(value("label_loops", "E1/m/s3/r1"), None, "nobody looked");
+        append(&list, &LabelLine { removed: true, ..line("ann", Some(3), Some("loops"), None) }).unwrap();
+        append(&list, &LabelLine { removed: true, ..line("ann", None, Some("confabulates"), None) }).unwrap();
+        let labels = Labels::beside(&inputs).unwrap();
+        assert_eq!((labels.columns().len(), labels.value("label_loops", "E1/m/s1/r1")), (0, None));
+    }
+
+    #[test]
+    fn concatenated_lists_are_a_valid_list() {
+        let of = |coder: &str| serde_json::to_string(&line(coder, None, Some("loops"), None)).unwrap() + "\n";
+        let (both, turned) = (read(&(of("ann") + &of("bob"))).unwrap(), read(&(of("bob") + &of("ann"))).unwrap());
+        assert_eq!(both.by_coder(), turned.by_coder());
+        assert_eq!(both.by_coder().keys().copied().collect::<Vec<_>>(), ["ann", "bob"]);
+    }
+
+    #[test]
+    fn an_invalid_line_is_named_with_what_is_expected() {
+        let good = r#"{"coder":"ann","episode_id":"e","label":"loops"}"#;
+        for (bad, expected, found) in [
+            (r#"{"coder":"ann","label":"loops"}"#, "expected a label", "missing field `episode_id`"),
+            (r#"{"coder":"ann","episode_id":"e","lable":"loops"}"#, "expected a label", "unknown field `lable`"),
+            (r#"{"coder":"ann","episode_id":"e","label":"Loops!"}"#, "lowercase letters", "`Loops!`"),
+            (r#"{"coder":"ann","episode_id":"e","step":0}"#, "a step from 1", "found 0"),
+            (r#"{"coder":" ","episode_id":"e"}"#, "a coder's name", "found ` `"),
+            ("[1", "expected a label", "found"),
+        ] {
+            let error = read(&format!("{good}\n\n{bad}\n")).unwrap_err();
+            assert!(error.contains("labels.jsonl, line 3: ") && error.contains("help: "), "{error}");
+            assert!(error.contains(expected) && error.contains(found), "{error}");
+        }
+        let long = format!(r#"{{"coder":"ann","episode_id":"e","note":"{}"}}"#, "x".repeat(2001));
+        assert!(read(&long).unwrap_err().contains("a note of at most 2000 characters, found 2001"));
+    }
+
+    #[test]
+    fn the_list_is_in_the_folder_of_the_trace() {
+        assert_eq!(list_beside(Path::new("a.parquet")), Path::new("labels.jsonl"));
+        assert_eq!(list_beside(Path::new("runs/.parts/a.parquet")), Path::new("runs/labels.jsonl"));
+    }
+}

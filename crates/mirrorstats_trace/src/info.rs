@@ -1,0 +1,384 @@
+//! The contents of traces: episodes, steps, names, the filled cells of the grid, and the files themselves.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::io;
+use std::num::NonZeroUsize;
+use std::sync::{Mutex, PoisonError};
+
+use arrow::array::{ArrayRef, AsArray as _, DictionaryArray};
+use arrow::datatypes::{Int32Type, Int64Type};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::diagnostic::Finding;
+use super::episodes::replies::{REPLY_STATUS, ReplyCounts};
+use super::error::TraceError;
+use super::read::budget::most_listed;
+use super::read::in_order::in_order;
+use super::read::open::{TraceFile, TraceSet};
+use super::renderer::{self, Renderer};
+use super::scan::{EpisodeBatch, Projection};
+use super::schema::{Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
+use mirrorstats_exact::budget::{Exceeded, Limit};
+use mirrorstats_exact::hash;
+use mirrorstats_parquet_pages::checksums::Checksums;
+
+/// A summary of some traces.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Info {
+    /// The number of episodes.
+    pub episodes: u64,
+    /// The number of their steps.
+    pub steps: u64,
+    /// The models, ascending.
+    pub models: Vec<String>,
+    /// The experiments, ascending.
+    pub experiments: Vec<String>,
+    /// The seeds, ascending.
+    pub seeds: Vec<i64>,
+    /// The runs, ascending.
+    pub runs: Vec<i64>,
+    /// Every experiment with every model, in that order.
+    pub coverage: Vec<Cell>,
+    /// The renderers of the frames that agents saw; absent if no trace declares one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renderers: Vec<Renderer>,
+    /// The reply counts; null if no file has the column `reply_status`.
+    pub replies: Option<ReplyCounts>,
+    /// The columns of all files.
+    pub columns: Vec<ColumnInfo>,
+    /// Every episode, in the order of files and rows; absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episode_list: Option<Vec<EpisodeInfo>>,
+    /// The files, in their order.
+    pub files: Vec<FileInfo>,
+}
+
+/// The episodes of one model in one experiment.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Cell {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The number of episodes.
+    pub episodes: u64,
+    /// Seeds and runs that some other cell has and this one lacks.
+    pub missing: Vec<SeedRun>,
+    /// Seeds and runs of which this cell has more than one episode.
+    pub repeated: Vec<SeedRun>,
+}
+
+/// A seed and a run within it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+pub struct SeedRun {
+    /// The seed.
+    pub seed: i64,
+    /// The run.
+    pub run: i64,
+}
+
+/// One episode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct EpisodeInfo {
+    /// Its id.
+    pub episode_id: String,
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The seed.
+    pub seed: i64,
+    /// The run within its seed.
+    pub run: i64,
+    /// Its steps.
+    pub steps: u64,
+    /// The name of its file.
+    pub file: String,
+}
+
+/// One column over all files.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ColumnInfo {
+    /// Its name.
+    pub name: String,
+    /// Its logical type; `unsupported` also where files differ.
+    #[serde(rename = "type")]
+    pub kind: Kind,
+    /// True if the schema knows it.
+    pub known: bool,
+    /// A file that does not have it.
+    pub missing_from: Option<String>,
+}
+
+/// One file.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct FileInfo {
+    /// Its name.
+    pub name: String,
+    /// Its size.
+    pub bytes: u64,
+    /// Its content's SHA-256.
+    pub sha256: String,
+    /// Its episodes.
+    pub episodes: u64,
+    /// Its rows.
+    pub steps: u64,
+    /// Its row groups.
+    pub row_groups: usize,
+    /// The version of the schema, if the file names one.
+    pub schema_version: Option<String>,
+    /// The program that wrote it, if the file names one.
+    pub writer: Option<String>,
+    /// The state of its checksums: `present`, `none`, or `stale` if another program wrote the file again.
+    pub checksums: Checksums,
+    /// The recording: JSON, or its text if that is no JSON.
+    pub recording: Option<serde_json::Value>,
+}
+
+/// The limit for the coverage of seeds and runs by model: seven models, five experiments and 20,000 runs have 700,000.
+const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
+
+/// The bytes of a cell, besides its names.
+const CELL: usize = 256;
+
+/// Whether to list episodes or only count them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Listing {
+    Episodes,
+    Nothing,
+}
+
+/// Summarises these traces. Reads the key columns and `reply_status` of all rows, and every byte for the hashes.
+pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
+    let mut listed = (listing == Listing::Episodes).then(Vec::new);
+    let bytes = set.files().iter().map(TraceFile::bytes).sum();
+    let most = most_listed(bytes);
+    // The names of models are compared, counted and printed in full.
+    let names = Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes);
+    let mut tally = EpisodeTally { files: vec![0; set.files().len()], ..EpisodeTally::default() };
+    let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
+    let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
+    let summary = set.scan(
+        &Projection { unchecked: statuses, ..Projection::default() },
+        threads,
+        |batch| {
+            let list = if listing == Listing::Episodes { list(set, &batch) } else { Vec::new() };
+            Ok::<_, TraceError>((Keys::of(&batch), ReplyCounts::of_batch(&batch), list))
+        },
+        |(keys, counts, list)| {
+            tally.add(keys);
+            names.check(tally.bytes).map_err(|exceeded| over_budget(set, &exceeded))?;
+            if let Some(listed) = &mut listed {
+                listed.extend(list);
+                most.check(listed.len() as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
+            }
+            if let Some(replies) = &mut replies {
+                replies.merge(&counts);
+            }
+            Ok(())
+        },
+    )?;
+    let (mut files, mut grid) = (Vec::with_capacity(set.files().len()), Grid::default());
+    let counts = std::mem::take(&mut tally.files);
+    let tally = Mutex::new(tally);
+    // Sorting the grid takes as long as hashing the files, so both run at once.
+    let jobs: Vec<_> = std::iter::once(None).chain(set.files().iter().zip(counts).map(Some)).collect();
+    let work = |job: &Option<(&TraceFile, u64)>| match job {
+        None => Ok(Done::Grid(std::mem::take(&mut *tally.lock().unwrap_or_else(PoisonError::into_inner)).grid())),
+        Some((file, episodes)) => about(file, *episodes).map(Done::File),
+    };
+    in_order(threads, &jobs, work, |done| {
+        match done? {
+            Done::Grid(found) => grid = found,
+            Done::File(about) => files.push(about),
+        }
+        Ok::<_, TraceError>(())
+    })?;
+    let Grid { cells, pairs } = grid;
+    let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
+    let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
+    let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
+    MOST_COVERED.check(asked as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
+    Ok(Info {
+        episodes: summary.episodes,
+        steps: summary.steps,
+        coverage: coverage(&cells, &pairs, &experiments, &models),
+        renderers: renderer::of_files(set.files()),
+        replies,
+        columns: columns(set),
+        episode_list: listed,
+        files,
+        seeds: distinct(pairs.iter().map(|pair| pair.seed)),
+        runs: distinct(pairs.iter().map(|pair| pair.run)),
+        models: models.into_iter().collect(),
+        experiments: experiments.into_iter().collect(),
+    })
+}
+
+fn over_budget(set: &TraceSet, exceeded: &Exceeded) -> TraceError {
+    Finding::over_budget(set.files().first().map_or("", TraceFile::name), exceeded).into()
+}
+
+enum Done {
+    Grid(Grid),
+    File(FileInfo),
+}
+
+fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut values: Vec<T> = values.collect();
+    // A stable sort, since it makes use of ascending stretches.
+    values.sort();
+    values.dedup();
+    values
+}
+
+/// The episodes of a batch, with experiments and models by index into the distinct ones.
+struct Keys {
+    file: usize,
+    cells: Vec<(String, String)>,
+    episodes: Vec<(usize, SeedRun)>,
+}
+
+impl Keys {
+    fn of(batch: &EpisodeBatch) -> Self {
+        let [experiments, models] = ["experiment", "model"].map(|name| texts_of(batch, name));
+        let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
+        // A batch has few cells, so finding one is faster than hashing it.
+        let (mut cells, mut known) = (Vec::new(), BTreeMap::new());
+        let episode = |row: usize| {
+            let cell = *known.entry((experiments.key(row), models.key(row))).or_insert_with(|| {
+                cells.push((text(experiments, row), text(models, row)));
+                cells.len() - 1
+            });
+            (cell, SeedRun { seed: seeds[row], run: runs[row] })
+        };
+        let episodes = (0..batch.episodes.num_rows()).map(episode).collect();
+        Self { file: batch.origin.file, cells, episodes }
+    }
+}
+
+fn column_of<'a>(batch: &'a EpisodeBatch, name: &str) -> &'a ArrayRef {
+    batch.episodes.column_by_name(name).expect("a scan delivers the columns of an episode")
+}
+
+fn texts_of<'a>(batch: &'a EpisodeBatch, name: &str) -> &'a DictionaryArray<Int32Type> {
+    column_of(batch, name).as_dictionary()
+}
+
+fn integers_of<'a>(batch: &'a EpisodeBatch, name: &str) -> &'a [i64] {
+    column_of(batch, name).as_primitive::<Int64Type>().values()
+}
+
+fn text(column: &DictionaryArray<Int32Type>, row: usize) -> String {
+    let key = column.key(row);
+    key.map_or_else(String::new, |key| column.values().as_string::<i32>().value(key).to_owned())
+}
+
+fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
+    let [ids, experiments, models] = ["episode_id", "experiment", "model"].map(|name| texts_of(batch, name));
+    let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
+    let file = set.files()[batch.origin.file].name();
+    let episode = |row: usize| EpisodeInfo {
+        episode_id: text(ids, row),
+        experiment: text(experiments, row),
+        model: text(models, row),
+        seed: seeds[row],
+        run: runs[row],
+        steps: (batch.offsets[row + 1] - batch.offsets[row]) as u64,
+        file: file.to_owned(),
+    };
+    (0..batch.episodes.num_rows()).map(episode).collect()
+}
+
+#[derive(Default)]
+struct EpisodeTally {
+    files: Vec<u64>,
+    /// The bytes of models and experiments, names included.
+    bytes: u64,
+    places: HashMap<(String, String), usize>,
+    episodes: Vec<Vec<SeedRun>>,
+}
+
+/// The number of episodes per seed and run, ascending, for each experiment and model.
+type Cells = BTreeMap<(String, String), Vec<(SeedRun, u64)>>;
+
+#[derive(Default)]
+struct Grid {
+    cells: Cells,
+    pairs: Vec<SeedRun>,
+}
+
+impl EpisodeTally {
+    fn add(&mut self, Keys { file, cells, episodes }: Keys) {
+        self.files[file] += episodes.len() as u64;
+        let places: Vec<usize> = cells.into_iter().map(|cell| self.place(cell)).collect();
+        for (cell, pair) in episodes {
+            self.episodes[places[cell]].push(pair);
+        }
+    }
+
+    fn place(&mut self, cell: (String, String)) -> usize {
+        let bytes = (CELL + cell.0.len() + cell.1.len()) as u64;
+        *self.places.entry(cell).or_insert_with(|| {
+            self.bytes += bytes;
+            self.episodes.push(Vec::new());
+            self.episodes.len() - 1
+        })
+    }
+
+    fn grid(self) -> Grid {
+        let Self { places, mut episodes, .. } = self;
+        let mut counted = |place: usize| {
+            let mut pairs = std::mem::take(&mut episodes[place]);
+            pairs.sort_unstable();
+            let same = pairs.chunk_by(|a, b| a == b);
+            same.map(|same| (same[0], same.len() as u64)).collect()
+        };
+        let cells: Cells = places.into_iter().map(|(cell, place)| (cell, counted(place))).collect();
+        let pairs = distinct(cells.values().flatten().map(|(pair, _)| *pair));
+        Grid { cells, pairs }
+    }
+}
+
+fn coverage(cells: &Cells, pairs: &[SeedRun], experiments: &BTreeSet<String>, models: &BTreeSet<String>) -> Vec<Cell> {
+    let cell = |experiment: &String, model: &String| {
+        let have = cells.get(&(experiment.clone(), model.clone())).map_or(&[][..], Vec::as_slice);
+        // Both are sorted, so one pass finds the missing ones.
+        let mut rest = have.iter().map(|(pair, _)| pair).peekable();
+        Cell {
+            experiment: experiment.clone(),
+            model: model.clone(),
+            episodes: have.iter().map(|(_, count)| count).sum(),
+            missing: pairs.iter().filter(|pair| rest.next_if_eq(pair).is_none()).copied().collect(),
+            repeated: have.iter().filter(|(_, count)| *count > 1).map(|(pair, _)| *pair).collect(),
+        }
+    };
+    experiments.iter().flat_map(|e| models.iter().map(move |m| cell(e, m))).collect()
+}
+
+fn columns(set: &TraceSet) -> Vec<ColumnInfo> {
+    let about = |name: &str| {
+        let found = set.column(name)?;
+        let known = set.domain().column(name).is_some();
+        Some(ColumnInfo { name: name.to_owned(), kind: found.kind, known, missing_from: found.missing_from })
+    };
+    set.column_names().into_iter().filter_map(about).collect()
+}
+
+fn about(file: &TraceFile, episodes: u64) -> Result<FileInfo, TraceError> {
+    let failed = |source: io::Error| TraceError::Read { what: file.name().to_owned(), source };
+    let text = |key| file.metadata_value(key).map(str::to_owned);
+    Ok(FileInfo {
+        name: file.name().to_owned(),
+        bytes: file.bytes(),
+        sha256: file.reader().and_then(hash::of_reader).map_err(failed)?,
+        episodes,
+        steps: file.rows(),
+        row_groups: file.row_groups(),
+        schema_version: text(VERSION_KEY),
+        writer: text(WRITER_KEY),
+        checksums: file.checksums(),
+        recording: text(RECORDING_KEY).map(|text| serde_json::from_str(&text).unwrap_or(text.into())),
+    })
+}

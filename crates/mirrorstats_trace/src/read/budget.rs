@@ -1,0 +1,110 @@
+//! Limits on the contents of a trace: rows, columns, episodes, the length of names and episodes. `parquet_pages` limits
+//! the inflated size of pages.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+
+use arrow::array::{Array as _, AsArray as _};
+
+use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
+use mirrorstats_parquet_pages::Column;
+
+/// The longest name of an episode, model, condition or colour: names are in every row of the outputs.
+pub(crate) const LONGEST_NAME: Limit = Limit::new("bytes in a name", 1024);
+
+/// The most steps of an episode, which is held in memory as a whole.
+pub(crate) const LONGEST_EPISODE: Limit = Limit::new("steps in an episode", 1 << 22);
+
+pub(crate) const MOST_COLUMNS: Limit = Limit::new("columns in a file", 10_000);
+
+pub(crate) fn most_rows(bytes: u64) -> Limit {
+    Limit::in_proportion("rows in a file of its size", 8_000_000, 16, bytes)
+}
+
+/// The most episodes. A row takes a byte in the densest traces, and an episode has several rows.
+pub(crate) const fn most_episodes(bytes: u64) -> Limit {
+    Limit::new("episodes in files of their size", 300_000).and_beyond(1 << 20, 1, bytes)
+}
+
+/// The most episodes of a list: each takes a kilobyte when printed.
+pub(crate) const fn most_listed(bytes: u64) -> Limit {
+    Limit::in_proportion("episodes in a list of files of their size", 100_000, 1, bytes / 8)
+}
+
+/// The most values of an episode held row by row: its steps times the columns of its file.
+pub(crate) const fn most_values(bytes: u64) -> Limit {
+    Limit::new("steps times columns of an episode that is shown", 2_000_000).and_beyond(1 << 20, 4, bytes)
+}
+
+/// The most memory of such an episode before it is shown.
+pub(crate) const fn most_shown(bytes: u64) -> Limit {
+    Limit::new("bytes of an episode that is shown", 48 << 20).and_beyond(1 << 20, 64, bytes)
+}
+
+/// The most values that an import reads one by one: rows of constant columns take no bytes.
+pub(crate) const fn most_imported(bytes: u64) -> Limit {
+    Limit::in_proportion("rows times columns of a file of its size", 8_000_000, 16, bytes)
+}
+
+/// The most bytes of rows that an import stores between its passes.
+pub(crate) const fn most_stored(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes of rows in a file of its size", 512 << 20, 256, bytes)
+}
+
+/// The number of episodes read from a file so far. Repeated reads count once.
+#[derive(Debug)]
+pub(crate) struct EpisodeBudget {
+    episodes: Budget,
+    /// By row group, the end of the rows read so far.
+    read: Mutex<HashMap<usize, u64>>,
+}
+
+impl EpisodeBudget {
+    pub(crate) fn new(bytes: u64) -> Self {
+        Self { episodes: Budget::new(most_episodes(bytes)), read: Mutex::default() }
+    }
+
+    /// Counts complete episodes of a row group, whose last row is before `end`.
+    pub(crate) fn spend(&self, row_group: usize, end: u64, count: usize) -> Result<(), Exceeded> {
+        let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = read.entry(row_group).or_default();
+        let is_new = end > *last;
+        *last = end.max(*last);
+        if is_new { self.episodes.spend(count as u64) } else { Ok(()) }
+    }
+}
+
+pub(crate) fn check_names(column: &Column) -> Result<(), Exceeded> {
+    let entries = column.entries();
+    let Some(texts) = entries.as_string_opt::<i32>() else { return Ok(()) };
+    if LONGEST_NAME.check(texts.value_data().len() as u64).is_ok() {
+        return Ok(());
+    }
+    let longest = (0..texts.len()).map(|at| texts.value_length(at)).max().unwrap_or_default();
+    LONGEST_NAME.check(u64::from(longest.cast_unsigned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::StringArray;
+    use mirrorstats_parquet_pages::{Column, Keys};
+
+    use super::{EpisodeBudget, check_names};
+
+    #[test]
+    fn episodes_are_counted_once_whatever_scans_them() {
+        let budget = EpisodeBudget::new(0);
+        assert!(budget.spend(0, 200_000, 200_000).is_ok() && budget.spend(0, 200_000, 200_000).is_ok());
+        assert!(budget.spend(1, 100_000, 100_000).is_ok() && budget.spend(1, 100_001, 1).is_err());
+    }
+
+    #[test]
+    fn long_names_are_refused() {
+        let names = |length: usize| {
+            Column::Keys(Keys::new(vec![0_u8].into(), Arc::new(StringArray::from(vec!["x".repeat(length)]))).unwrap())
+        };
+        assert!(check_names(&names(1024)).is_ok() && check_names(&names(1025)).is_err());
+    }
+}

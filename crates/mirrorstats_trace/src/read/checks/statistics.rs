@@ -1,0 +1,268 @@
+//! Compares the values of a row group with the statistics in its footer, if no checksum protects them.
+//!
+//! Rule: a file is refused only for errors that no sound writer makes. These are a wrong null count, values out of
+//! bounds, a wrong total size of texts, and a bound (number, truth or short text) that neither a row nor a dictionary
+//! has. Long texts may be cut.
+
+use std::cmp::Ordering;
+
+use arrow::array::{Array, ArrayRef, AsArray as _, UInt8Array};
+use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+use parquet::basic::{ConvertedType, Encoding, LogicalType};
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+use parquet::file::statistics::Statistics;
+
+use mirrorstats_exact::escape::visible;
+use mirrorstats_parquet_pages::{Column, Runs};
+
+/// Writers may cut texts from this length on.
+const CUT: usize = 60;
+
+#[derive(Debug, Default)]
+pub(crate) struct DeclaredStatistics(Vec<Vec<Option<Chunk>>>);
+
+/// A footer's statistics of the values of a chunk.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Chunk {
+    nulls: Option<u64>,
+    /// The total bytes of the texts of all rows.
+    bytes: Option<u64>,
+    least: Option<Bound>,
+    greatest: Option<Bound>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Bound {
+    Bool(bool),
+    Int(i64),
+    Float(f64),
+    Text(Vec<u8>),
+}
+
+impl DeclaredStatistics {
+    pub(crate) fn of(metadata: &ParquetMetaData) -> Self {
+        let groups = metadata.row_groups().iter();
+        Self(groups.map(|group| group.columns().iter().map(Chunk::of).collect()).collect())
+    }
+
+    pub(crate) fn chunk(&self, row_group: usize, column: usize) -> Option<&Chunk> {
+        self.0.get(row_group)?.get(column)?.as_ref()
+    }
+}
+
+impl Chunk {
+    fn of(chunk: &ColumnChunkMetaData) -> Option<Self> {
+        // Arrow's C++ writer counts the stored bytes of delta-encoded texts here.
+        let is_delta = chunk
+            .encodings()
+            .any(|encoding| matches!(encoding, Encoding::DELTA_BYTE_ARRAY | Encoding::DELTA_LENGTH_BYTE_ARRAY));
+        let bytes = chunk.unencoded_byte_array_data_bytes().filter(|_| !is_delta);
+        let bytes = bytes.and_then(|bytes| u64::try_from(bytes).ok());
+        let Some(statistics) = chunk.statistics() else {
+            return bytes.map(|bytes| Self { bytes: Some(bytes), ..Self::default() });
+        };
+        let described = chunk.column_descr();
+        let logical = described.logical_type_ref();
+        let is_unsigned = matches!(logical, Some(LogicalType::Integer(integer)) if !integer.is_signed)
+            || matches!(
+                described.converted_type(),
+                ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32 | ConvertedType::UINT_64
+            );
+        let [least, greatest] = match statistics {
+            _ if is_unsigned => [None, None],
+            Statistics::Boolean(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Bool(*value)),
+            Statistics::Int32(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Int((*value).into())),
+            Statistics::Int64(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Int(*value)),
+            Statistics::Float(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Float((*value).into())),
+            Statistics::Double(of) => ends([of.min_opt(), of.max_opt()], |value| Bound::Float(*value)),
+            // The older fields are ordered as signed bytes.
+            Statistics::ByteArray(of) if !statistics.is_min_max_deprecated() => {
+                ends([of.min_opt(), of.max_opt()], |value| Bound::Text(value.data().to_vec()))
+            }
+            _ => [None, None],
+        };
+        Some(Self { nulls: statistics.null_count_opt(), bytes, least, greatest })
+    }
+}
+
+fn ends<T>(ends: [Option<&T>; 2], value: impl Fn(&T) -> Bound) -> [Option<Bound>; 2] {
+    ends.map(|end| end.map(&value))
+}
+
+/// The values read so far of a column of a row group.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Seen {
+    nulls: u64,
+    bytes: u64,
+    least: Option<Bound>,
+    greatest: Option<Bound>,
+    /// The bounds of dictionary texts. Some writers use these for statistics, even if no row has them.
+    entries: Option<[Vec<u8>; 2]>,
+}
+
+impl Seen {
+    pub(crate) fn add(&mut self, column: &Column) {
+        match column {
+            Column::Flat(values) => self.flat(values),
+            Column::Runs(runs) => self.runs(runs),
+            Column::Keys(keys) => self.keys(keys.keys(), keys.values()),
+        }
+    }
+
+    /// The first mismatch: expected and found.
+    pub(crate) fn fault(&self, declared: &Chunk) -> Option<(String, String)> {
+        let nulls = declared.nulls.filter(|nulls| *nulls != self.nulls);
+        if let Some(nulls) = nulls {
+            return Some((format!("{nulls} nulls, as in the footer's statistics"), self.nulls.to_string()));
+        }
+        if let Some(bytes) = declared.bytes.filter(|bytes| *bytes != self.bytes) {
+            return Some((format!("texts of {bytes} bytes, as in the footer's statistics"), self.bytes.to_string()));
+        }
+        let bounds = [
+            (&declared.least, &self.least, Ordering::Less, "least"),
+            (&declared.greatest, &self.greatest, Ordering::Greater, "greatest"),
+        ];
+        bounds.into_iter().find_map(|(declared, found, beyond, word)| {
+            let (declared, found) = (declared.as_ref()?, found.as_ref()?);
+            let order = found.order(declared)?;
+            // Some row must have a bound that is not cut, unless it is that of a dictionary.
+            let may_be_absent = matches!(declared, Bound::Text(text)
+                if text.len() >= CUT || self.entries.as_ref().is_some_and(|ends| ends.contains(text)));
+            let expected = || format!("{} as the {word} value, as in the footer's statistics", declared.words());
+            let is_wrong = order == beyond || order != Ordering::Equal && !may_be_absent;
+            is_wrong.then(|| (expected(), found.words()))
+        })
+    }
+
+    fn value(&mut self, value: &Bound) {
+        let is_beyond =
+            |bound: &Option<Bound>, beyond| bound.as_ref().is_none_or(|bound| value.order(bound) == Some(beyond));
+        if is_beyond(&self.least, Ordering::Less) {
+            self.least = Some(value.clone());
+        }
+        if is_beyond(&self.greatest, Ordering::Greater) {
+            self.greatest = Some(value.clone());
+        }
+    }
+
+    fn flat(&mut self, values: &ArrayRef) {
+        if !matches!(values.data_type(), DataType::Dictionary(..)) {
+            self.nulls += values.null_count() as u64;
+            self.ends(values, 0..values.len());
+            return;
+        }
+        let texts = values.as_dictionary::<Int32Type>();
+        self.nulls += texts.keys().null_count() as u64;
+        let mut used = vec![0; texts.values().len()];
+        for key in texts.keys().iter().flatten() {
+            if let Some(used) = usize::try_from(key).ok().and_then(|key| used.get_mut(key)) {
+                *used += 1;
+            }
+        }
+        self.used(texts.values(), &used);
+    }
+
+    fn runs(&mut self, runs: &Runs) {
+        let starts: Vec<(usize, usize)> = runs.starts().collect();
+        let ends = starts.iter().skip(1).map(|(start, _)| *start).chain([runs.rows()]);
+        let lengths: Vec<u64> = starts.iter().zip(ends).map(|((start, _), end)| (end - start) as u64).collect();
+        let values = runs.values();
+        let nulls = starts.iter().zip(&lengths).filter(|((_, run), _)| values.is_null(*run));
+        self.nulls += nulls.map(|(_, length)| length).sum::<u64>();
+        match values.data_type() {
+            DataType::Dictionary(..) => {
+                let texts = values.as_dictionary::<Int32Type>();
+                let mut used = vec![0; texts.values().len()];
+                for ((_, run), length) in starts.iter().zip(&lengths) {
+                    texts.key(*run).and_then(|key| used.get_mut(key)).into_iter().for_each(|used| *used += length);
+                }
+                self.used(texts.values(), &used);
+            }
+            _ => self.ends(values, starts.iter().map(|(_, run)| *run)),
+        }
+    }
+
+    fn keys(&mut self, keys: &UInt8Array, values: &ArrayRef) {
+        self.nulls += keys.null_count() as u64;
+        let mut used = [0; 256];
+        keys.iter().flatten().for_each(|key| used[usize::from(key)] += 1);
+        self.used(values, &used);
+    }
+
+    fn used(&mut self, values: &ArrayRef, used: &[u64]) {
+        if let Some(texts) = values.as_string_opt::<i32>() {
+            let bytes =
+                (0..texts.len()).zip(used).map(|(at, rows)| u64::from(texts.value_length(at).cast_unsigned()) * rows);
+            self.bytes += bytes.sum::<u64>();
+            let entries =
+                texts.iter().flatten().map(str::as_bytes).chain(self.entries.iter().flatten().map(Vec::as_slice));
+            let ends = entries.clone().min().zip(entries.max());
+            self.entries = ends.map(|(least, greatest)| [least.to_vec(), greatest.to_vec()]);
+        }
+        self.ends(values, (0..values.len()).filter(|at| used.get(*at).is_some_and(|rows| *rows > 0)));
+    }
+
+    fn ends(&mut self, values: &ArrayRef, rows: impl Iterator<Item = usize>) {
+        let rows = rows.filter(|row| values.is_valid(*row));
+        match values.data_type() {
+            DataType::Boolean => {
+                let values = values.as_boolean();
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, Bound::Bool);
+            }
+            DataType::Int64 => {
+                let values = values.as_primitive::<Int64Type>();
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, Bound::Int);
+            }
+            DataType::Float64 => {
+                let values = values.as_primitive::<Float64Type>();
+                let numbers = rows.map(|row| values.value(row)).filter(|value| !value.is_nan());
+                self.both(numbers, f64::total_cmp, Bound::Float);
+            }
+            DataType::Utf8 => {
+                let values = values.as_string::<i32>();
+                self.both(rows.map(|row| values.value(row)), Ord::cmp, |text| Bound::Text(text.as_bytes().to_vec()));
+            }
+            _ => {}
+        }
+    }
+
+    fn both<T: Copy>(
+        &mut self,
+        mut values: impl Iterator<Item = T>,
+        order: impl Fn(&T, &T) -> Ordering,
+        value: impl Fn(T) -> Bound,
+    ) {
+        let Some(first) = values.next() else { return };
+        let (least, greatest) = values.fold((first, first), |(least, greatest), next| {
+            (
+                if order(&next, &least).is_lt() { next } else { least },
+                if order(&next, &greatest).is_gt() { next } else { greatest },
+            )
+        });
+        self.value(&value(least));
+        self.value(&value(greatest));
+    }
+}
+
+impl Bound {
+    /// `None` for values of two types: the column is wider than its statistics.
+    fn order(&self, other: &Self) -> Option<Ordering> {
+        match (self, other) {
+            (Self::Bool(a), Self::Bool(b)) => Some(a.cmp(b)),
+            (Self::Int(a), Self::Int(b)) => Some(a.cmp(b)),
+            // Equal regardless of the sign of zero; NaN does not compare.
+            (Self::Float(a), Self::Float(b)) => a.partial_cmp(b),
+            (Self::Text(a), Self::Text(b)) => Some(a.cmp(b)),
+            _ => None,
+        }
+    }
+
+    fn words(&self) -> String {
+        match self {
+            Self::Bool(value) => value.to_string(),
+            Self::Int(value) => value.to_string(),
+            Self::Float(value) => value.to_string(),
+            Self::Text(text) => format!("`{}`", visible(&String::from_utf8_lossy(text))),
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Opens traces together: reads every footer and determines the use of each column over all files.
+
+use std::sync::Arc;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Schema};
+
+pub use super::footer::trace_file::{FileColumn, TraceFile};
+use crate::episodes::labels::Labels;
+use crate::error::TraceError;
+use crate::inputs::Input;
+use crate::schema::{self, COLUMNS, Column, Domain, Kind};
+
+/// Open traces: every footer is read and valid, no rows are read yet.
+#[derive(Debug)]
+pub struct TraceSet {
+    files: Vec<TraceFile>,
+    /// The labels of coders beside the traces, one value per episode.
+    labels: Labels,
+    label_columns: Vec<String>,
+}
+
+/// The type and presence of a column over all files of a set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnUse {
+    /// The logical type, the same in all files that have the column; [`Kind::Unsupported`] if they differ.
+    pub kind: Kind,
+    /// The name of a file without the column, if any; its rows read as null.
+    pub missing_from: Option<String>,
+    /// True if its type in every file that has it says that it holds only nulls; it then fits any declared type.
+    pub is_null: bool,
+    /// Two files that disagree on the type, with their types.
+    pub conflict: Option<[(String, Kind); 2]>,
+}
+
+impl TraceSet {
+    /// Opens these files in the given order ([`resolve`](crate::inputs::resolve) orders them by name).
+    pub fn open(inputs: &[Input]) -> Result<Self, TraceError> {
+        let mut files = Vec::with_capacity(inputs.len());
+        let mut faults = Vec::new();
+        for input in inputs {
+            match TraceFile::open(input) {
+                Ok(file) => files.push(file),
+                Err(findings) => faults.extend(findings),
+            }
+        }
+        let set = Self::of(files);
+        if set.domain() == Domain::Mirror {
+            // Files of another domain among traces of the mirror's.
+            faults.extend(set.files.iter().flat_map(TraceFile::strangeness));
+        }
+        match TraceError::of(faults) {
+            Some(error) => Err(error),
+            None => Ok(set),
+        }
+    }
+
+    /// The domain of all files: the mirror's, unless every file has another one.
+    pub fn domain(&self) -> Domain {
+        let is_own = |file: &TraceFile| file.domain() == Domain::Own;
+        if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
+    }
+
+    /// The schema's column of this name in these files; `None` for an own column.
+    pub fn schema_column(&self, name: &str) -> Option<&'static Column> {
+        schema::column(name).filter(|_| self.domain() == Domain::Mirror || self.declares(name))
+    }
+
+    /// Returns true if the schema's column keeps its meaning in these files, present or not.
+    pub fn knows(&self, known: &Column) -> bool {
+        self.domain().has(known) && (self.column(known.name).is_none() || self.declares(known.name))
+    }
+
+    pub fn of(files: Vec<TraceFile>) -> Self {
+        Self { files, labels: Labels::default(), label_columns: Vec::new() }
+    }
+
+    pub fn files(&self) -> &[TraceFile] {
+        &self.files
+    }
+
+    /// The use of a column over all files; `None` if no file and no label has it.
+    pub fn column(&self, name: &str) -> Option<ColumnUse> {
+        if self.is_label_column(name) {
+            return Some(ColumnUse { kind: Kind::Bool, missing_from: None, is_null: false, conflict: None });
+        }
+        let mut seen: Option<(&TraceFile, Kind)> = None;
+        let (mut present, mut missing_from, mut conflict) = (false, None, None);
+        for file in &self.files {
+            match (file.column(name).map(|column| column.kind), seen) {
+                (None, _) => missing_from = missing_from.or_else(|| Some(file.name().to_owned())),
+                (Some(None), _) => present = true,
+                (Some(Some(kind)), None) => seen = Some((file, kind)),
+                (Some(Some(kind)), Some((first, known))) if kind != known && conflict.is_none() => {
+                    conflict = Some([(first.name().to_owned(), known), (file.name().to_owned(), kind)]);
+                }
+                (Some(Some(_)), Some(_)) => {}
+            }
+        }
+        // A column that is null in every file has the schema's type, or text if it is not in the schema.
+        let unseen = || self.domain().column(name).map_or(Kind::String, |column| column.stored.kind());
+        let kind = if conflict.is_some() { Kind::Unsupported } else { seen.map_or_else(unseen, |(_, kind)| kind) };
+        let is_null = seen.is_none();
+        (present || !is_null).then_some(ColumnUse { kind, missing_from, is_null, conflict })
+    }
+
+    pub fn declares(&self, name: &str) -> bool {
+        self.files.iter().any(|file| file.declares(name))
+    }
+
+    /// The names of all columns of all files: those of the schema in its order, then the others in file order.
+    pub fn column_names(&self) -> Vec<&str> {
+        let known = COLUMNS.iter().filter(|column| self.domain().has(column)).map(|column| column.name);
+        let mut names: Vec<&str> =
+            known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
+        let all = |file| TraceFile::columns(file).iter().chain(file.folders().iter().map(|folder| &folder.column));
+        for column in self.files.iter().flat_map(all) {
+            if !names.contains(&column.name.as_str()) {
+                names.push(&column.name);
+            }
+        }
+        names
+    }
+
+    pub fn with_labels(self, labels: Labels) -> Result<Self, TraceError> {
+        let columns = labels.columns();
+        if let Some(column) = columns.iter().find(|name| self.column(name).is_some()) {
+            let expected = "a label whose column no trace has";
+            let found = "a column of the traces and a label in `labels.jsonl`".to_owned();
+            return Err(TraceError::Column { column: column.clone(), expected, found });
+        }
+        Ok(Self { labels, label_columns: columns, ..self })
+    }
+
+    pub fn labels(&self) -> &Labels {
+        &self.labels
+    }
+
+    /// The columns of the labels: true, false or null in each episode.
+    pub fn label_columns(&self) -> &[String] {
+        &self.label_columns
+    }
+
+    pub fn is_label_column(&self, name: &str) -> bool {
+        self.label_columns.iter().any(|column| column == name)
+    }
+
+    pub(crate) fn with_label_columns(
+        &self,
+        episodes: RecordBatch,
+        columns: &[&str],
+    ) -> Result<RecordBatch, TraceError> {
+        if columns.is_empty() {
+            return Ok(episodes);
+        }
+        let ids = episodes.column_by_name("episode_id").expect("every batch names its episodes");
+        let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
+        let ids = ids.as_string::<i32>();
+        let mut fields: Vec<Field> =
+            episodes.schema_ref().fields().iter().map(|field| field.as_ref().clone()).collect();
+        let mut arrays = episodes.columns().to_vec();
+        for column in columns {
+            let values: BooleanArray = ids.iter().map(|id| self.labels.value(column, id?)).collect();
+            fields.push(Field::new(*column, values.data_type().clone(), true));
+            arrays.push(Arc::new(values) as ArrayRef);
+        }
+        RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).map_err(TraceError::Memory)
+    }
+}

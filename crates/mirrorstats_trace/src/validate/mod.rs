@@ -1,0 +1,337 @@
+//! Checks traces against every rule of the schema and reports all faults, not only the first.
+//!
+//! The other files are checked even if one is damaged. Columns outside the schema are not decoded, but their pages and
+//! checksums are checked like all others.
+
+pub(crate) mod color_set;
+pub(crate) mod duplicate_ids;
+pub(crate) mod episode_hashes;
+pub(crate) mod rules;
+
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::num::NonZeroUsize;
+
+use indexmap::IndexSet;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::copies::{Copied, copies};
+use super::diagnostic::{Code, Finding, Severity};
+use super::episodes::answers;
+use super::episodes::replies::{REPLY_STATUS, ReplyCounts, statuses};
+use super::error::TraceError;
+use super::inputs::Input;
+use super::read::open::{TraceFile, TraceSet};
+use super::read::parallel_scan::{Episodes, ScanEvent, pass};
+use super::read::projection::Layout;
+use super::read::verify::verify_columns;
+use super::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
+use color_set::{Tally, sightings};
+use duplicate_ids::{SeenIds, Start, starts};
+use mirrorstats_parquet_pages::checksums::Checksums;
+use rules::{Located, Rules};
+
+/// The checks and their findings.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Validation {
+    /// The files, in their order.
+    pub files: Vec<CheckedFile>,
+    /// All findings, by file, row group and row; what only all inputs together show comes last of its file.
+    pub findings: Vec<Finding>,
+}
+
+/// One file that was looked at.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct CheckedFile {
+    /// Its name.
+    pub name: String,
+    /// True if all of its rows were checked; not so where the file cannot be read to its end.
+    pub complete: bool,
+    /// Episodes that were checked.
+    pub episodes: u64,
+    /// Their rows.
+    pub steps: u64,
+    /// True if it has checksums; without them damage may not be found.
+    pub checksums: Checksums,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rest<'a> {
+    pub file: &'a str,
+    pub code: Code,
+    pub count: usize,
+}
+
+impl Validation {
+    /// The error with the findings that are errors, the earliest first.
+    pub(crate) fn errors(self) -> Result<(), TraceError> {
+        let errors = self.findings.into_iter().filter(|finding| finding.severity == Severity::Error);
+        TraceError::of(errors.collect()).map_or(Ok(()), Err)
+    }
+
+    pub fn count(&self, severity: Severity) -> usize {
+        self.findings.iter().filter(|finding| finding.severity == severity).count()
+    }
+
+    /// The first `limit` findings of each file and rule, and the number of others.
+    pub fn abridged(&self, limit: usize) -> (Vec<&Finding>, Vec<Rest<'_>>) {
+        let (mut shown, mut rest) = (Vec::new(), Vec::<Rest>::new());
+        let mut counts = indexmap::IndexMap::<_, usize>::new();
+        for finding in &self.findings {
+            let count = counts.entry((finding.file.as_str(), finding.code)).or_default();
+            *count += 1;
+            if *count <= limit {
+                shown.push(finding);
+            }
+        }
+        for ((file, code), count) in counts {
+            if count > limit {
+                rest.push(Rest { file, code, count: count - limit });
+            }
+        }
+        (shown, rest)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Expected<'a> {
+    /// The known experiments, besides those that the files declare; any if `None`.
+    pub experiments: Option<&'a [String]>,
+    /// The domain; the mirror's definitions refuse traces of others.
+    pub domain: Domain,
+    pub declared: &'a [DeclaredColumn],
+    /// True to skip the search for copied episodes.
+    pub errors_alone: bool,
+}
+
+/// Checks these files as traces of the mirror. Experiments are checked against `experiments`, if given, and against
+/// those that the files declare.
+pub fn validate(
+    inputs: &[Input],
+    experiments: Option<&[String]>,
+    threads: NonZeroUsize,
+) -> Result<Validation, TraceError> {
+    validate_as(inputs, Expected { experiments, ..Expected::default() }, threads)
+}
+
+pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsize) -> Result<Validation, TraceError> {
+    let mut report = Validation::default();
+    let mut found: Vec<Vec<Finding>> = Vec::new();
+    let (mut opened, mut places) = (Vec::new(), Vec::new());
+    let mut files: Vec<_> = inputs.iter().map(TraceFile::open).collect();
+    refuse_strangers(&mut files, expected);
+    for (place, (input, file)) in inputs.iter().zip(files).enumerate() {
+        let checksums = file.as_ref().map(TraceFile::checksums).unwrap_or_default();
+        let (name, complete) = (input.name.clone(), file.is_ok());
+        report.files.push(CheckedFile { name, complete, episodes: 0, steps: 0, checksums });
+        match file {
+            Ok(file) => {
+                opened.push(file);
+                places.push(place);
+                found.push(Vec::new());
+            }
+            Err(findings) => found.push(findings),
+        }
+    }
+    let set = TraceSet::of(opened);
+    let known = expected.experiments.map(|known| with_declared(known, &set));
+    let mut replies = vec![ReplyCounts::default(); inputs.len()];
+    check_rows(&set, Expected { experiments: known.as_deref(), ..expected }, threads, |file, checked| {
+        let place = places[file];
+        match checked {
+            ScanEvent::Fault(finding) => {
+                report.files[place].complete = false;
+                found[place].push(*finding);
+            }
+            ScanEvent::Whole(checked) => {
+                report.files[place].episodes += checked.episodes;
+                report.files[place].steps += checked.steps;
+                found[place].extend(checked.findings);
+                replies[place].merge(&checked.replies);
+            }
+        }
+    })?;
+    for (file, place) in set.files().iter().zip(&places) {
+        if report.files[*place].complete
+            && let Err(finding) = verify_columns(file, |name| set.domain().column(name).is_none())
+        {
+            report.files[*place].complete = false;
+            found[*place].push(*finding);
+        }
+        found[*place].extend(stale(file));
+    }
+    for ((found, input), mut replies) in found.iter_mut().zip(inputs).zip(replies) {
+        // A status outside the schema has a finding already.
+        replies.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
+        found.extend(unreadable(&input.name, &replies));
+    }
+    report.findings = found.into_iter().flatten().collect();
+    Ok(report)
+}
+
+fn refuse_strangers(files: &mut [Result<TraceFile, Vec<Finding>>], expected: Expected<'_>) {
+    let is_mirror = |file: &Result<TraceFile, _>| file.as_ref().is_ok_and(|file| file.domain() == Domain::Mirror);
+    let is_any = expected.domain == Domain::Own && !files.iter().any(is_mirror);
+    for file in files {
+        let Ok(opened) = file else { continue };
+        let found = if is_any { opened.misdeclared(expected.declared) } else { opened.strangeness() };
+        if !found.is_empty() {
+            *file = Err(found);
+        }
+    }
+}
+
+fn stale(file: &TraceFile) -> Option<Finding> {
+    let expected = format!("a file of which `{}` has the checksums", schema::CHECKSUMS_KEY);
+    let found = "one that another program wrote again: they are not checked";
+    (file.checksums() == Checksums::Stale).then(|| Finding::new(Code::StaleChecksums, file.name(), expected, found))
+}
+
+fn with_declared(known: &[String], set: &TraceSet) -> Vec<String> {
+    let declared = set.files().iter().flat_map(TraceFile::experiments).map(|declared| declared.name.clone());
+    let all: IndexSet<String> = known.iter().cloned().chain(declared).collect();
+    all.into_iter().collect()
+}
+
+fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
+    let (bad, all) = (replies.all_unreadable(), replies.replies);
+    let finding = || {
+        let found = format!("{bad} of {all} steps with another status: {replies}");
+        Finding::new(Code::UnreadableReplies, file, "the status `ok` or `repaired`", found).in_column(REPLY_STATUS)
+    };
+    (bad > 0).then(finding)
+}
+
+struct ValidatedFile {
+    findings: Vec<Finding>,
+    episodes: u64,
+    steps: u64,
+    replies: ReplyCounts,
+}
+
+fn check_rows(
+    set: &TraceSet,
+    expected: Expected<'_>,
+    threads: NonZeroUsize,
+    mut receive: impl FnMut(usize, ScanEvent<ValidatedFile>),
+) -> Result<(), TraceError> {
+    let known = COLUMNS.iter().filter(|column| set.domain().has(column)).map(|column| column.name);
+    let declared = expected.declared.iter().filter(|_| set.domain() == Domain::Own).map(|own| own.name.as_str());
+    let mut answers: Vec<DeclaredColumn> = Vec::new();
+    for own in set.files().iter().flat_map(TraceFile::experiments).flat_map(|experiment| &experiment.answers) {
+        match answers.iter_mut().find(|known| known.name == own.name) {
+            // Two experiments may give a key different options.
+            Some(known) if known.values.is_empty() || own.values.is_empty() => known.values.clear(),
+            Some(known) => {
+                let new: Vec<_> = own.values.iter().filter(|value| !known.values.contains(value)).cloned().collect();
+                known.values.extend(new);
+            }
+            None => answers.push(own.clone()),
+        }
+    }
+    let names = set.column_names();
+    let is_readable = |name: &&str| set.column(name).is_some_and(|column| column.kind != Kind::Unsupported);
+    let asked = answers::among(&names).into_iter().filter(is_readable);
+    let present = known.chain(declared).filter(|name| set.column(name).is_some()).chain(asked);
+    if set.files().is_empty() {
+        return Ok(());
+    }
+    let mut layout = Layout::new(set, present, [])?;
+    layout.with_declared(expected.declared);
+    layout.with_declared(&answers);
+    let rules = Rules { layout: &layout, experiments: expected.experiments };
+    let statuses = layout.position(REPLY_STATUS).filter(|at| layout.columns[*at].known.is_some());
+    let name = |file: usize| set.files()[file].name().to_owned();
+    let work = |episodes: Episodes| {
+        let mut found = rules.check(&set.files()[episodes.file], &episodes);
+        found.extend(split(&name(episodes.file), &episodes));
+        found.extend(episode_hashes::check(&set.files()[episodes.file], &layout, &episodes));
+        let checked = ValidatedFile {
+            findings: Vec::new(),
+            episodes: episodes.len() as u64,
+            steps: episodes.columns[0].len() as u64,
+            replies: statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at])),
+        };
+        let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
+        (found, colors, starts(&episodes), alike(&episodes), checked)
+    };
+    let (mut ids, mut tally) = (SeenIds::default(), Tally::new(set.files()));
+    let mut alike = HashMap::new();
+    pass(set.files(), &layout, threads, &work, |file, event| {
+        let event = match event {
+            ScanEvent::Fault(finding) => ScanEvent::Fault(finding),
+            ScanEvent::Whole((found, colors, starts, keys, checked)) => {
+                tally.add(set.files(), file, colors);
+                for (key, id) in keys.into_iter().filter(|_| !expected.errors_alone) {
+                    alike.entry(key).or_insert_with(Vec::new).push((id, file));
+                }
+                ScanEvent::Whole(ValidatedFile {
+                    findings: with_repeated(found, starts, &mut ids, file, name),
+                    ..checked
+                })
+            }
+        };
+        receive(file, event);
+        Ok::<_, TraceError>(())
+    })?;
+    for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, alike, threads)) {
+        let checked = ValidatedFile { findings: vec![finding], episodes: 0, steps: 0, replies: ReplyCounts::default() };
+        receive(file, ScanEvent::Whole(checked));
+    }
+    Ok(())
+}
+
+/// The ids of episodes, each with a hash of its model, experiment, seed, run and length, which copies share.
+fn alike(episodes: &Episodes) -> Vec<(u64, String)> {
+    let key = |ends: &[usize]| {
+        let (at, mut hasher) = (ends[0], DefaultHasher::new());
+        episodes.columns[1..3].iter().for_each(|column| column.text(at).hash(&mut hasher));
+        episodes.columns[3..5].iter().for_each(|column| column.int(at).hash(&mut hasher));
+        (ends[1] - at).hash(&mut hasher);
+        Some((hasher.finish(), episodes.id(at)?.to_owned()))
+    };
+    episodes.offsets.windows(2).filter_map(key).collect()
+}
+
+/// The copies, each with its file. Unreadable files have other findings.
+fn copied(set: &TraceSet, alike: HashMap<u64, Vec<(String, usize)>>, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
+    let several = alike.into_values().filter(|episodes| episodes.len() > 1);
+    let files: BTreeMap<String, usize> = several.flatten().collect();
+    let found = copies(set, files.keys().cloned().collect(), threads).unwrap_or_default();
+    let finding = |Copied { episode, of }: Copied| {
+        let file = files.get(&episode).copied()?;
+        let found = format!("those of `{}` in all columns but the id", mirrorstats_exact::escape::visible(&of));
+        let name = set.files()[file].name();
+        Some((file, Finding::new(Code::CopiedEpisode, name, "rows of its own", found).in_episode(&episode)))
+    };
+    found.into_iter().filter_map(finding).collect()
+}
+
+fn with_repeated(
+    mut found: Vec<Located>,
+    starts: Vec<Start>,
+    ids: &mut SeenIds,
+    file: usize,
+    name: impl Fn(usize) -> String,
+) -> Vec<Finding> {
+    let repeated: Vec<_> = starts.into_iter().filter_map(|start| ids.admit(start, file, &name)).collect();
+    // Separated rows of one episode: not starting at t = 1 is not another fault.
+    let apart = |row| repeated.iter().any(|again| again.row == row && again.finding.code == Code::EpisodeTwice);
+    found.retain(|located| located.finding.code != Code::TStart || !apart(located.row));
+    let mut all: Vec<Located> = repeated.into_iter().chain(found).collect();
+    all.sort_by_key(|located| located.row);
+    all.into_iter().map(|located| located.finding).collect()
+}
+
+fn split(file: &str, episodes: &Episodes) -> Option<Located> {
+    let groups: Vec<_> = episodes.pieces.iter().map(|piece| piece.row_group).collect();
+    let (first, last) = (*groups.first()?, *groups.last()?);
+    if first == last {
+        return None;
+    }
+    let id = episodes.id(0)?;
+    let found = format!("its rows in row groups {first} to {last}");
+    let finding = Finding::new(Code::SplitEpisode, file, "the episode in one row group", found);
+    Some(Located { row: 0, finding: finding.in_row_group(first).in_episode(id) })
+}

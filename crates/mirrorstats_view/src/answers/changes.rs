@@ -1,0 +1,51 @@
+//! The effects of other definitions: every cell and every flip.
+
+use serde_json::{Value, json};
+
+use crate::{Snapshot, ViewError};
+use mirrorstats_exact::escape::visible;
+use mirrorstats_report::cells::diff::Flip;
+use mirrorstats_study::{DiffRequest, Side, diff};
+
+pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
+    let options = &snapshot.options;
+    let Some(against) = &options.against else {
+        return Err(ViewError::Absent("no other definitions were named; `mirrorstats view --against` does".to_owned()));
+    };
+    let scored = snapshot.table()?;
+    if !scored.study.parts().is_empty() {
+        let words = "the experiments have different definitions; `mirrorstats diff` holds one against another";
+        return Err(ViewError::Absent(words.to_owned()));
+    }
+    let own = scored.study.definitions_name();
+    let request = DiffRequest {
+        metrics: options.question.metrics.clone(),
+        filter: options.question.filter.clone(),
+        threads: options.threads,
+        ..DiffRequest::default()
+    };
+    let found = diff(&Side::of(own)?, &Side::of(against)?, &scored.inputs, &request)?;
+    let changes = found.changes;
+    let cells = changes.cells.iter().map(|cell| json!(cell));
+    Ok(json!({
+        "before": visible(&changes.definitions.before.name),
+        "after": visible(&changes.definitions.after.name),
+        "cells_compared": changes.cells_compared,
+        "rewritten": changes.rewritten,
+        "cells": cells.collect::<Vec<_>>(),
+        "flips": changes.flips.iter().map(told).collect::<Vec<_>>(),
+        "notes": found.notes,
+    }))
+}
+
+fn told(flip: &Flip) -> Value {
+    let mut told = json!(flip);
+    // A browser would round large numbers.
+    told["value"] = json!({
+        "before": flip.value.before.map(|value| value.to_string()),
+        "after": flip.value.after.map(|value| value.to_string()),
+    });
+    told["id"] = json!(flip.episode.episode_id);
+    told["name"] = json!(visible(&flip.episode.episode_id));
+    told
+}

@@ -1,0 +1,134 @@
+//! The logs of recordings: what they have of an episode's steps.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::log::LogError;
+use mirrorstats_trace::log::frames::{self, LogIndex, Moment, SceneShape};
+use mirrorstats_trace::write::merge::OwnColumn;
+
+/// The number of log indices in memory.
+const KEPT_INDICES: usize = 64;
+
+/// An episode, and whether it is still being recorded.
+#[derive(Clone, Debug)]
+pub(super) struct Opened {
+    /// The episode, or its steps so far.
+    pub episode: Episode,
+    /// The log of an episode under way.
+    pub running: Option<PathBuf>,
+    pub input: Option<Input>,
+    /// The columns of the steps if the trace is from another domain; the episode then has only identity and time.
+    pub own: Option<Vec<OwnColumn>>,
+}
+
+impl Opened {
+    fn time_of(&self, t: usize) -> Option<u64> {
+        let step = self.episode.steps.get(t.checked_sub(1)?)?;
+        u64::try_from(step.extra.frame_time?).ok()
+    }
+
+    /// The steps by the times of their frames, ns.
+    fn times(&self) -> BTreeMap<u64, usize> {
+        (1..=self.episode.steps.len()).filter_map(|t| Some((self.time_of(t)?, t))).collect()
+    }
+}
+
+/// Passes what an index has of an episode at some times.
+type Read<T> = fn(&LogIndex, &str, &BTreeSet<u64>, &mut dyn FnMut(u64, T)) -> Result<(), LogError>;
+
+/// Finished logs, and the recently used indices of them.
+#[derive(Debug)]
+pub(super) struct Logs {
+    pub paths: Vec<PathBuf>,
+    indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
+    reading: Mutex<()>,
+}
+
+impl Logs {
+    pub fn new(paths: Vec<PathBuf>) -> Self {
+        Self { paths, indices: Mutex::default(), reading: Mutex::default() }
+    }
+
+    /// The log's record of a step.
+    pub fn moment(&self, opened: &Opened, t: usize) -> Result<Option<Moment>, LogError> {
+        let Some(time) = opened.time_of(t) else { return Ok(None) };
+        if let Some(log) = &opened.running {
+            return frames::unfinished_step(log, time);
+        }
+        for log in self.of(opened) {
+            let Some(index) = self.index(log)? else { continue };
+            if let Some(moment) = index.step(&opened.episode.episode_id, time)? {
+                return Ok(Some(moment));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Passes the shapes of each step with its t; no calls without a log. Only one log at a time is read for shapes.
+    pub fn each_shapes(&self, opened: &Opened, give: &mut dyn FnMut(usize, Vec<SceneShape>)) -> Result<(), LogError> {
+        let _one = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(log) = &opened.running {
+            let times = opened.times();
+            return frames::each_unfinished_shapes(log, &mut |time, shapes| {
+                if let Some(t) = times.get(&time) {
+                    give(*t, shapes);
+                }
+            });
+        }
+        self.each(opened, LogIndex::each_shapes, give)
+    }
+
+    /// Passes the log's record of each step of a finished episode, reading the log once.
+    pub fn each_moment(&self, opened: &Opened, give: &mut dyn FnMut(usize, Moment)) -> Result<(), LogError> {
+        self.each(opened, LogIndex::each_moment, give)
+    }
+
+    /// Reads the first log that has steps of the episode.
+    fn each<T>(&self, opened: &Opened, read: Read<T>, give: &mut dyn FnMut(usize, T)) -> Result<(), LogError> {
+        let times = opened.times();
+        let wanted: BTreeSet<u64> = times.keys().copied().collect();
+        let is_found = Cell::new(false);
+        for log in self.of(opened) {
+            let Some(index) = self.index(log)? else { continue };
+            read(&index, &opened.episode.episode_id, &wanted, &mut |time, found| {
+                is_found.set(true);
+                if let Some(t) = times.get(&time) {
+                    give(*t, found);
+                }
+            })?;
+            if is_found.get() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn of(&self, opened: &Opened) -> impl Iterator<Item = &PathBuf> {
+        let beside = opened.input.as_ref().map(|input| input.path.with_extension("mcap"));
+        let own = self.paths.iter().find(|log| Some(*log) == beside.as_ref());
+        let others = if own.is_none() { self.paths.as_slice() } else { &[] };
+        own.into_iter().chain(others)
+    }
+
+    /// The index of a log, read once; `None` if it has no index or is not the log of a recording.
+    fn index(&self, log: &Path) -> Result<Option<Arc<LogIndex>>, LogError> {
+        let mut indices = self.indices.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(index) = indices.get(log) {
+            return Ok(index.clone());
+        }
+        if indices.len() >= KEPT_INDICES {
+            indices.clear();
+        }
+        let index = match LogIndex::open(log) {
+            Err(LogError::Foreign { .. }) => None,
+            opened => opened?.map(Arc::new),
+        };
+        indices.insert(log.to_owned(), index.clone());
+        Ok(index)
+    }
+}

@@ -74,49 +74,49 @@ run stats-sequential-json stats $paper --sequential --json
 run diff diff paper extended $paper
 run diff-own diff paper mine.toml $paper --json
 run diff-scores diff scores.parquet scores.csv
-run rescore rescore report --definitions mine.toml --traces fixtures/paper --out rescored
-run rescore-json rescore report --definitions extended --traces fixtures/paper --out rescored-json --json
-run verify verify report
-run verify-json verify report --json
+run rescore table rescore report --definitions mine.toml --traces fixtures/paper --out rescored
+run rescore-json table rescore report --definitions extended --traces fixtures/paper --out rescored-json --json
+run verify table verify report
+run verify-json table verify report --json
 for table in main appendix; do
-  run compare-$table compare $paper --published fixtures/published/${table}_table.csv
-  run compare-$table-json compare $paper --published fixtures/published/${table}_table.csv --json
-  run audit-$table audit fixtures/published/${table}_table.csv --n 21
+  run compare-$table table compare $paper --published fixtures/published/${table}_table.csv
+  run compare-$table-json table compare $paper --published fixtures/published/${table}_table.csv --json
+  run audit-$table table audit fixtures/published/${table}_table.csv --n 21
 done
-run audit-json audit fixtures/published/main_table.csv fixtures/published/appendix_table.csv --n 21 --json
-run audit-rounding audit fixtures/published/main_table.csv --n 21 --rounding half-up,truncate
+run audit-json table audit fixtures/published/main_table.csv fixtures/published/appendix_table.csv --n 21 --json
+run audit-rounding table audit fixtures/published/main_table.csv --n 21 --rounding half-up,truncate
 run plan plan --difference 0.3
 run plan-runs plan --runs 7
 run plan-json plan --episodes 21 --models 2 --chance 1/3 --json
 run plan-register plan --difference 0.3 --register plan.json
-run sensitivity sensitivity $recorded --out thresholds
-run sensitivity-json sensitivity $recorded --json --figure thresholds.svg
+run sensitivity definitions sensitivity $recorded --out thresholds
+run sensitivity-json definitions sensitivity $recorded --json --figure thresholds.svg
 for command in info validate; do
   for inputs in $paper $recorded fixtures/damaged fixtures/checksums fixtures/glimpses.parquet; do
-    run "$command-${inputs//\//-}" $command $inputs
-    run "$command-${inputs//\//-}-json" $command $inputs --json
+    run "$command-${inputs//\//-}" trace $command $inputs
+    run "$command-${inputs//\//-}-json" trace $command $inputs --json
   done
 done
-run info-episodes info $recorded --episodes
+run info-episodes trace info $recorded --episodes
 for damaged in "$root"/fixtures/damaged/*.parquet; do
   name=$(basename "$damaged" .parquet)
   run "damaged-$name" score "fixtures/damaged/$name.parquet"
   run "damaged-$name-json" --errors json score "fixtures/damaged/$name.parquet"
 done
-run check check $recorded --max-unreadable 0.05 --max-refused 0.1 --max-truncated 0.1 --max-repaired 0.1
-run check-json check $recorded --max-latency 1 --max-lost 0 --json
-run check-paper check $paper --max-unreadable 0.05
-run check-none check $recorded
+run check trace check $recorded --max-unreadable 0.05 --max-refused 0.1 --max-truncated 0.1 --max-repaired 0.1
+run check-json trace check $recorded --max-latency 1 --max-lost 0 --json
+run check-paper trace check $paper --max-unreadable 0.05
+run check-none trace check $recorded
 run import import steps.jsonl -o imported.parquet
 run import-json import steps.jsonl -o imported-json.parquet --palette red,green --cluster seed --json
 run import-refused import mine.toml -o never.parquet
-run recover recover $recorded/E1-guesser.mcap -o recovered.parquet
-run recover-cut recover cut.mcap -o cut.parquet --json
-for name in trace step experiments experiment reply-cubes reply-exploration; do run schema-$name schema $name --json; done
-run schema schema
+run recover trace recover $recorded/E1-guesser.mcap -o recovered.parquet
+run recover-cut trace recover cut.mcap -o cut.parquet --json
+for name in trace step experiments experiment reply-cubes reply-exploration; do run schema-$name trace schema $name --json; done
+run schema trace schema
 for dialect in portable spark duckdb; do
-  run sql-$dialect sql --dialect $dialect
-  run sql-$dialect-extended sql --dialect $dialect --definitions extended $recorded
+  run sql-$dialect definitions sql --dialect $dialect
+  run sql-$dialect-extended definitions sql --dialect $dialect --definitions extended $recorded
 done
 run query query "SELECT model, COUNT(*) AS steps FROM steps GROUP BY model ORDER BY model" $paper
 run query-episodes query "SELECT * FROM episodes ORDER BY episode_id" $recorded
@@ -149,8 +149,8 @@ run world-scene world scene E1..E5 --seed 2 --run 3
 run world-sheet world sheet --out sheet
 run record record --agent oracle --experiment E1 --seeds 1 --runs 1 --out runs
 run forecast record --agent vlm --model gpt-5.1 --dry-run
-run replay replay $recorded/E1-oracle.parquet --json
-run filmstrip filmstrip E1/oracle/s1/r1 $some -o strip.png
+run replay world replay $recorded/E1-oracle.parquet --json
+run filmstrip world filmstrip E1/oracle/s1/r1 $some -o strip.png
 run export view $recorded --export page
 run refused score nosuch.parquet
 run refused-json --errors json score $paper --where "TSAA = 1"

@@ -203,7 +203,8 @@ fn rules_of_the_mirror_apply_only_to_the_mirror() {
         refused.contains("`robots.parquet` has no column of the domain `mirror`") && refused.contains("--definitions"),
         "{refused}"
     );
-    let told = run(at, &["trace", "validate", "robots.parquet"]).ends(1);
+    run(at, &["trace", "validate", "robots.parquet"]).done();
+    let told = run(at, &["trace", "validate", "robots.parquet", "--definitions", "paper"]).ends(1);
     assert!(told.stdout.contains("missing-column") && told.stdout.contains("mirror_visible"), "{}", told.stdout);
     let mixed = fixture("paper");
     let refused = run(

@@ -96,7 +96,7 @@ fn printing_as(span: Span, target: Decimal, shown: impl Fn(i128) -> Option<Decim
     (from, beyond - 1)
 }
 
-/// The first integer of a span for which `holds` is false; one past its end if there is none.
+/// The first integer of a span for which `holds` is false; one past the end if it always holds.
 pub(crate) fn first_not((mut low, high): Span, holds: impl Fn(i128) -> bool) -> i128 {
     let mut beyond = (high + 1).max(low);
     while low < beyond {

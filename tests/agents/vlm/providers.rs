@@ -146,12 +146,19 @@ fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
 #[test]
 fn arguments_as_an_object_and_the_older_form_of_a_call_are_taken() {
     let arguments: Value = serde_json::from_str(&decision("w")).unwrap();
+    let call = json!([{ "function": { "name": "reply", "arguments": arguments } }]);
+    let alone = vec![Repair::ToolCall];
     let messages = [
-        json!({ "content": null, "tool_calls": [{ "function": { "name": "reply", "arguments": arguments } }] }),
-        json!({ "content": "", "function_call": { "name": "reply", "arguments": decision("w") } }),
-        json!({ "content": null, "tool_calls": [], "function_call": { "name": "reply", "arguments": arguments } }),
+        (json!({ "content": null, "tool_calls": call }), alone.clone()),
+        (json!({ "content": "", "function_call": { "name": "reply", "arguments": decision("w") } }), alone.clone()),
+        (
+            json!({ "content": null, "tool_calls": [], "function_call": { "name": "reply", "arguments": arguments } }),
+            alone,
+        ),
+        (json!({ "content": "I answer:", "tool_calls": call }), vec![Repair::ToolCall, Repair::SurroundingText]),
+        (json!({ "content": "<think>{1}</think>", "tool_calls": call }), vec![Repair::ToolCall, Repair::Thoughts]),
     ];
-    for message in messages {
+    for (message, repairs) in messages {
         let shown = message.to_string();
         let usage = json!({ "prompt_tokens": 100.0, "completion_tokens": 5.0 });
         let body = json!({ "choices": [{ "finish_reason": "stop", "message": message }], "usage": usage });
@@ -159,7 +166,7 @@ fn arguments_as_an_object_and_the_older_form_of_a_call_are_taken() {
         let bench = Bench::new(Limits::default());
         let vlm = bench.vlm(&server, Dialect::OpenaiChat);
         let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
-        assert_eq!((reply.status, reply.repairs), (Status::Repaired, vec![Repair::ToolCall]), "{shown}");
+        assert_eq!((reply.status, reply.repairs), (Status::Repaired, repairs), "{shown}");
         assert_eq!((reply.usage.prompt_tokens, reply.usage.completion_tokens), (Some(100), Some(5)), "{shown}");
     }
 }

@@ -158,10 +158,6 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
 #[test]
 fn refusals_and_empty_answers_have_each_providers_own_form() {
     let openai = |choice| ok(&json!({ "choices": [choice], "usage": {} }));
-    let called = |text: &str, arguments: &str| {
-        let function = json!({ "name": "reply", "arguments": arguments });
-        json!({ "content": text, "tool_calls": [{ "type": "function", "function": function }] })
-    };
     check(
         Dialect::OpenaiChat,
         vec![
@@ -178,16 +174,6 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
                 "parts of reasoning alone",
                 openai(json!({ "message": { "content": [{ "type": "reasoning_text", "text": decision("w") }] } })),
                 Status::Empty,
-            ),
-            (
-                "a call beside a text",
-                openai(json!({ "message": called("I answer:", &decision("w")) })),
-                Status::Repaired,
-            ),
-            (
-                "a call beside thoughts",
-                openai(json!({ "message": called("<think>{1}</think>", &decision("w")) })),
-                Status::Repaired,
             ),
             ("choices of another kind", ok(&json!({ "choices": null })), Status::ServerError),
         ],

@@ -1,4 +1,4 @@
-//! Values of a trace of another domain: each is shown as it is stored, and nothing is shown that the trace lacks.
+//! Values of a trace of another domain are shown unchanged, and absent ones are not shown.
 
 use std::fs::{self, File};
 use std::path::Path;

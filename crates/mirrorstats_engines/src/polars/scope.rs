@@ -271,7 +271,7 @@ impl<'p, 's> Scope<'p, 's> {
         }
     }
 
-    /// A chain of one operator nests as deeply as it is long.
+    /// A chain of one operator nests once per operand.
     fn chain(&mut self, left: &Ast, op: &BinaryOperator, right: &Ast) -> Answer {
         let (mut parts, mut rest) = (vec![self.truth(right)?], left);
         while let Ast::BinaryOp { left, op: other, right } = rest {

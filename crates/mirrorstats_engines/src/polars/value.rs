@@ -13,7 +13,7 @@ pub(super) struct Value {
     pub(super) bits: u32,
 }
 
-/// The most rows of which a sum is known to fit, as bits.
+/// Sums of up to 2^31 rows are known to fit.
 const ROWS: u32 = 31;
 const MOST_BITS: u32 = 62;
 

@@ -27,7 +27,7 @@ pub(super) struct Window {
     /// Columns that the steps read.
     pub(super) prepared: Vec<Expr>,
     pub(super) order: Vec<Order>,
-    /// New columns, of which each step may read those of the one before.
+    /// New columns. A step may read the columns of the step before it.
     pub(super) steps: Vec<Vec<Expr>>,
 }
 

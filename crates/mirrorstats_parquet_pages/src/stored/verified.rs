@@ -143,7 +143,7 @@ impl Verified {
         {
             return Err(self.fault(offset, expected, found));
         }
-        // A run of a few bytes may stand for millions of items of lists, which no count of rows bounds.
+        // A run of a few bytes may expand to millions of list items. The number of rows does not limit them.
         let items = if self.flat { 0 } else { header.values.saturating_mul(size_of::<u64>()) };
         let inflated = header.whole.max(items);
         self.store.expansion.page(self.place, offset, inflated).map_err(|exceeded| self.over(offset, &exceeded))?;

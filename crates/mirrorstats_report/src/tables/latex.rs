@@ -147,7 +147,7 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_' || c == '-'
 }
 
-/// True for a word that stands for a missing value, and a dash in a sentence.
+/// True for a placeholder of a missing value, and for a dash in a sentence.
 fn is_dash(word: &str) -> bool {
     matches!(word, "--" | "---")
 }
@@ -157,7 +157,7 @@ fn identifier(label: &str) -> String {
     label.chars().filter(|c| c.is_alphanumeric() || ":-_.".contains(*c)).collect()
 }
 
-/// Text that prints as it is, in the font encodings OT1 and T1.
+/// Escaped text that prints unchanged in the font encodings OT1 and T1.
 fn escape(text: &str) -> String {
     let text = visible(text);
     let inner = text.trim_matches(' ');

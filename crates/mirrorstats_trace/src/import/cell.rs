@@ -5,7 +5,7 @@
 use super::line::{LineValue, whole};
 use crate::schema::Kind;
 
-/// The type of a cell by itself.
+/// The type of one cell, without its column.
 pub(super) fn kind_of(cell: &str) -> Kind {
     match cell {
         cell if cell.eq_ignore_ascii_case("true") || cell.eq_ignore_ascii_case("false") => Kind::Bool,

@@ -1,24 +1,35 @@
-# The two commands of the README: `make demo` and `make test`.
+# The commands of the README: `make demo`, `make test` and `make test-all`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check check-lerobot recorded calibrate questions bench bench-import bench-scores bench-world bench-agents bench-view sheet
+.PHONY: demo test test-all check-default others fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check check-lerobot recorded calibrate questions bench bench-import bench-scores bench-world bench-agents bench-view sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
 	scripts/demo.sh
 
-## Everything that CI checks.
-test: fmt lint unit docs end-to-end test-wheel
+## What a change needs: format, clippy, unit and boundary tests, doc examples, the published tables from outside.
+test: fmt lint unit end-to-end
+
+## The rest of what CI checks: programs of others, power cuts, the browser suite, long rounds, the book, the wheel.
+test-all: test check-default others docs test-wheel
+
+# Tests that take most of the time, by their modules: `make test` skips them, `make test-all` runs them.
+LONG = accessible:: calibration:: documented_command_lines faults:: foreign:: hostile:: html::address html::episodes \
+	html::figures html::pair html::results html::surroundings latex:: log::lengths on_cluster pairs:: people:: \
+	view::copy view::find view::first_screen view::labels view::live world::panes
 
 fmt:
 	cargo fmt --all --check
 
-# Once as most people build it, and once with everything: Polars, and the world on MuJoCo's library.
+# With everything: Polars, and the world on MuJoCo's library.
 lint:
 	scripts/get-mujoco.sh
+	cargo clippy --workspace --all-targets --all-features -- -D warnings
+
+# As most people build it.
+check-default:
 	cargo clippy --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats_view \
 		--all-targets -- -D warnings
-	cargo clippy --workspace --all-targets --all-features -- -D warnings
 
 # What the tests need, each script says what it cannot get.
 needed:
@@ -34,8 +45,12 @@ needed:
 
 # The member `fuzz` replays its corpora; chosen together, both use one build of the program. Many tests wait for other
 # processes, so more tests run than there are processors.
+THREADS = RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$(( $$(getconf _NPROCESSORS_ONLN) * 3 / 2 ))}
 unit: needed
-	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$(( $$(getconf _NPROCESSORS_ONLN) * 3 / 2 ))} cargo test --workspace --all-features --no-fail-fast
+	$(THREADS) cargo test --workspace --all-features --no-fail-fast -- $(addprefix --skip ,$(LONG))
+
+others: needed
+	$(THREADS) cargo test --workspace --all-features --no-fail-fast --lib --bins --tests -- $(LONG)
 
 ## The campaigns that are too long for CI, with their full numbers of rounds: benches/SOAK.md.
 soak: needed

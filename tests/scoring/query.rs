@@ -160,5 +160,5 @@ fn a_refused_query_comes_with_a_command_line_for_duckdb() {
 fn evidence_is_refused_for_another_engine() {
     let (code, out, err) = run(&["score", FIXTURE, "--engine", "spark", "--explain", "E1/gpt-5-1/s1/r2"]);
     assert_eq!((code, out.as_str()), (2, ""));
-    assert!(err.contains("--explain shows what the native engine decided by"), "{err}");
+    assert!(err.contains("--explain looks into the steps, which Spark keeps to itself"), "{err}");
 }

@@ -38,10 +38,6 @@ impl ScoreArgs {
         if self.engine.engine == Engine::Spark {
             return self.run_on_spark();
         }
-        if self.explain.is_some() && self.engine.engine != Engine::Native {
-            let words = "error: --explain shows what the native engine decided by\n  help: leave --engine out";
-            return Err(Failure::Rendered(words.to_owned()));
-        }
         // Refuse an unknown output format before a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
         let study = self.traces.study_on(&self.engine, &self.scoring, &GroupingArgs::default())?;

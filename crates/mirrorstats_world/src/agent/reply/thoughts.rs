@@ -97,6 +97,9 @@ pub(super) enum Thoughts<'a> {
 pub(super) fn of(text: &str) -> Thoughts<'_> {
     let (mut rest, mut found) = (text, Thoughts::None);
     loop {
+        if found != Thoughts::None && Object::parse(rest).is_ok() {
+            return found;
+        }
         let end = match opened(rest) {
             Some((kind, after)) => match kind.end(&rest[after..]) {
                 Some(end) => after + end,

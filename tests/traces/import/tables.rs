@@ -6,8 +6,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{
-    ArrayRef, BinaryArray, BooleanArray, Date32Array, Decimal128Array, DurationMillisecondArray, Float32Array,
-    Float64Array, Int64Array, NullArray, RecordBatch, StringArray, TimestampMicrosecondArray, UInt64Array,
+    ArrayRef, BinaryArray, BooleanArray, Decimal128Array, DurationMillisecondArray, Float32Array, Float64Array,
+    Int64Array, NullArray, RecordBatch, StringArray, TimestampMicrosecondArray, UInt64Array,
 };
 use arrow::datatypes::Float16Type;
 
@@ -350,7 +350,7 @@ fn queries_of_other_types_answer_as_duckdb_or_are_refused() {
     let at = folder.path();
     let columns = vec![
         ("f", Arc::new(Float32Array::from(vec![0.1, 0.5])) as ArrayRef),
-        ("d", Arc::new(Date32Array::from(vec![1, 2]))),
+        ("d", Arc::new(arrow::array::Date32Array::from(vec![1, 2]))),
     ];
     write_rows(&at.join("in.parquet"), &[table(columns)], None);
     let asked = |sql: &str| run(at, &["query", sql, "in.parquet", "--definitions", "arms.toml", "--format", "csv"]);

@@ -116,6 +116,7 @@ pub(super) fn of(text: &str) -> Thoughts<'_> {
 }
 
 /// Returns true if a text has an object outside of its thoughts.
+#[cfg(feature = "sim")]
 pub(crate) fn has_object(text: &str) -> bool {
     match of(text) {
         Thoughts::None => text.contains('{'),

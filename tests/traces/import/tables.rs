@@ -339,7 +339,7 @@ fn folders_may_have_columns() {
     #[cfg(feature = "polars")]
     {
         let told = run(at, &["query", "select model from steps", "runs", "--definitions", "open.toml"]).refused();
-        assert!(told.contains("expected `act` in the column `model`, as in its folder"), "{told}");
+        assert!(told.contains("expected `act`, as in the name of the folder\n  found `bee`"), "{told}");
     }
 }
 

@@ -16,7 +16,7 @@ pub enum Kind {
     Real,
     Float,
     Text,
-    /// A date, a list or another type that queries do not read.
+    /// A date or another type that queries do not read.
     Other,
 }
 

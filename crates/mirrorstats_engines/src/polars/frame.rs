@@ -3,12 +3,13 @@
 use std::fs;
 
 use polars::prelude::{
-    AnyValue, DataType, Expr, HiveOptions, LazyFrame, NULL, NamedFrom, PlRefPath, ScanArgsParquet, ScanSources, Series,
+    DataType, Expr, HiveOptions, LazyFrame, NULL, NamedFrom, PlRefPath, ScanArgsParquet, ScanSources, Series,
     UnionArgs, col, concat, lit, when,
 };
 
 use super::run::{PolarsError, collect};
 use mirrorstats_trace::episodes::labels::Labels;
+use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::read::open::{TraceFile, TraceSet};
 use mirrorstats_trace::read::verify::verify_pages;
 use mirrorstats_trace::schema::{Kind, Stored};
@@ -85,11 +86,10 @@ fn label(labels: &Labels, name: &str) -> Expr {
 fn check_folders(file: &TraceFile) -> Result<(), PolarsError> {
     for folder in file.folders().iter().filter(|folder| file.folder(&folder.column.name).is_none()) {
         let (name, Some(value)) = (folder.column.name.as_str(), folder.value()) else { continue };
-        let other = col(name).cast(DataType::String).neq(lit(value)).any(true);
-        let found = collect(whole(file)?.select([other]))?;
-        if found.columns()[0].get(0)? == AnyValue::Boolean(true) {
-            let expected = format!("{}: expected `{value}` in the column `{name}`, as in its folder", file.name());
-            return Err(PolarsError::Failed(format!("{expected}; move the file, or correct the column")));
+        let own = col(name).cast(DataType::String);
+        let others = collect(whole(file)?.select([own.clone().filter(own.neq(lit(value)))]).limit(1))?;
+        if let Some(found) = others.columns()[0].str()?.iter().flatten().next() {
+            return Err(TraceError::from(folder.contradicted(file.name(), found)).into());
         }
     }
     Ok(())

@@ -20,9 +20,6 @@ use mirrorstats_exact::suggest::nearest;
 use mirrorstats_metric::syntax::grammar::shortened;
 use mirrorstats_toml_spec::Source;
 
-/// What a column of another type is.
-pub(super) const OTHER: &str = "neither true or false, a number nor a text";
-
 /// Polars plans by recursion.
 const DEEPEST: usize = 100;
 
@@ -230,11 +227,18 @@ impl<'p, 's> Scope<'p, 's> {
         self.wrong(name.span, message, Some(near.unwrap_or_else(|| format!("columns are {}", columns.join(", ")))))
     }
 
+    /// Refuses a column whose type queries do not read.
+    pub(super) fn check_type(&self, span: Span, name: &str, kind: Kind) -> Answer<()> {
+        if kind != Kind::Other {
+            return Ok(());
+        }
+        let what = format!("the column `{name}`: expected true or false, a number or a text, found another type");
+        Err(unsupported(self.source(), span, what))
+    }
+
     /// Refuses the column of a row where groups are meant.
     fn ungrouped(&self, name: &Ident, value: Value) -> Answer {
-        if value.kind == Kind::Other {
-            return Err(unsupported(self.source(), name.span, format!("`{}`, which is {OTHER}", name.value)));
-        }
+        self.check_type(name.span, &name.value, value.kind)?;
         match &self.keys {
             Some(keys) if self.rows_of.is_none() => {
                 let (name, span) = (&name.value, name.span);

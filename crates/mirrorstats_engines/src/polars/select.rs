@@ -12,10 +12,10 @@ use sqlparser::ast::{
 use super::accepted::Kind;
 use super::names::column_name;
 use super::plan::{Planner, sort};
-use super::refused::{QueryError, unsupported};
+use super::refused::QueryError;
 use super::relation::{Column, Found, Relation, find};
 use super::run::PolarsError;
-use super::scope::{Key, OTHER, Scope};
+use super::scope::{Key, Scope};
 use super::value::Value;
 use super::windows::{Order, integer, is_aggregate_call};
 
@@ -277,12 +277,11 @@ impl Scope<'_, '_> {
             return self.wrong(item.span(), format!("`{item}` has no columns"), Some("name a table with FROM".into()));
         }
         let is_kept = |column: &&&Column| !excluded.iter().any(|name| column.name.eq_ignore_ascii_case(name));
-        let kept = columns.iter().filter(is_kept);
-        if let Some(other) = kept.clone().find(|column| column.kind == Kind::Other) {
-            let what = format!("`{}`, which is {OTHER}", other.name);
-            return Err(unsupported(self.source(), item.span(), what));
-        }
-        Ok(kept.map(|column| Item { name: column.name.clone(), ast: None, value: column.value() }).collect())
+        let kept = columns.iter().filter(is_kept).map(|column| {
+            self.check_type(item.span(), &column.name, column.kind)?;
+            Ok(Item { name: column.name.clone(), ast: None, value: column.value() })
+        });
+        kept.collect()
     }
 
     fn columns_of(&mut self, items: &[Item]) -> Vec<Column> {

@@ -63,9 +63,14 @@ impl FolderColumn {
             Kind::Int => column.int(row).map(|found| found.to_string()).filter(|found| found != value),
             _ => column.text(row).filter(|found| *found != value).map(str::to_owned),
         })?;
-        let expected = format!("`{}`, as in the name of the folder", visible(value));
-        let finding = Finding::new(Code::InconsistentConstant, file, expected, format!("`{}`", visible(&found)));
+        Some(self.contradicted(file, &found))
+    }
+
+    /// The finding for the value `found` in the file's own column.
+    pub fn contradicted(&self, file: &str, found: &str) -> Finding {
+        let expected = format!("`{}`, as in the name of the folder", visible(self.value().unwrap_or_default()));
+        let finding = Finding::new(Code::InconsistentConstant, file, expected, format!("`{}`", visible(found)));
         let help = "move the file to the folder of its values, or correct the column";
-        Some(finding.in_column(&self.column.name).with_help(help))
+        finding.in_column(&self.column.name).with_help(help)
     }
 }

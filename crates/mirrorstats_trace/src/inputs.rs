@@ -170,7 +170,7 @@ fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
 }
 
-/// The value in the name of a folder that stands for null.
+/// The value that marks null in the name of a folder.
 pub(crate) const NULL_FOLDER: &str = "__HIVE_DEFAULT_PARTITION__";
 
 /// The columns in the folder names of a path, as in partitioned tables of Spark and others: `experiment=E1`.

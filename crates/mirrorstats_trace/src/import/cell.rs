@@ -80,7 +80,7 @@ fn is_special(cell: &str) -> bool {
 /// Returns true if the nearest float is this number: a whole number exactly, another one to all digits that are spelled
 /// or to those of the float's shortest spelling, such as `0.1`.
 pub(super) fn is_held(number: &str) -> bool {
-    /// Every decimal with so many digits is the shortest spelling of its float.
+    /// Up to this many significant digits, a decimal is the shortest spelling of its float (IEEE 754, binary64).
     const ALWAYS: usize = 15;
     /// No float has more significant digits.
     const MOST: usize = 767;
@@ -101,7 +101,7 @@ pub(super) fn is_held(number: &str) -> bool {
     }
 }
 
-/// The digits without the zeros before them, and without those after them; `0` if there are no others.
+/// The digits without leading zeros and, with `trim_end`, without trailing zeros.
 fn significant(number: &str, trim_end: bool) -> String {
     let digits: String = number.chars().filter(char::is_ascii_digit).collect();
     let digits = digits.trim_start_matches('0');

@@ -36,7 +36,7 @@ struct Inferred {
     /// True if a value has a type of its own, which cells of CSV must fit.
     is_typed: bool,
     wide: Option<(Place, i64)>,
-    /// The first cell that stands for no value, or is a number that floats do not hold: a text only among texts.
+    /// The first cell that marks a missing value or is a number that floats do not hold. It is a text only among texts.
     odd: Option<(Place, String)>,
 }
 

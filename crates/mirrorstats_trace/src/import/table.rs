@@ -1,7 +1,7 @@
 //! Columns of tables as the values of rows, unchanged: numbers keep their value, infinities and NaN included.
 //!
-//! What is neither a number nor a truth value becomes text, such as `2026-01-01T00:00:00Z` of a time in any zone. Bytes
-//! are text in UTF-8, as writers without the annotation leave it.
+//! Values of other types than numbers and truth values become text. A time in any zone becomes `2026-01-01T00:00:00Z`.
+//! Bytes are text in UTF-8: some writers leave out the annotation.
 
 use std::sync::Arc;
 

@@ -76,6 +76,7 @@ impl Tables {
         let large = column(draw, &|draw| draw.between(-40, 40) * 1_000_000_007);
         let floats: Vec<Option<f64>> =
             column(draw, &|draw| draw.between(-9, 9)).iter().map(|n| n.map(|n| n as f64 / 4.0)).collect();
+        let singles: Vec<Option<f32>> = floats.iter().map(|x| x.map(|x| x as f32 / 3.0)).collect();
         let flags: Vec<Option<bool>> =
             column(draw, &|draw| draw.between(0, 1)).iter().map(|n| n.map(|n| n == 1)).collect();
         let strings: Vec<Option<&str>> =
@@ -83,7 +84,7 @@ impl Tables {
         let keys: Vec<&str> = (0..rows).map(|_| ids[draw.below(5)]).collect();
         let t: Vec<i32> = (0..rows).map(|row| i32::try_from(row).unwrap()).collect();
         let k: Vec<Option<i8>> = small.iter().map(|n| n.map(|n| n as i8)).collect();
-        let steps = df!("episode_id" => keys, "t" => t, "k" => k, "i" => large, "j" => small, "x" => floats, "b" => flags, "s" => strings);
+        let steps = df!("episode_id" => keys, "t" => t, "k" => k, "i" => large, "j" => small, "x" => floats, "f" => singles, "b" => flags, "s" => strings);
         let episodes = df!(
             "episode_id" => ["a", "b", "c", "d"], "model" => [Some("m"), Some("n"), None, Some("m")], "seed" => [1, 1, 2, -2],
             "TSA" => [Some(1_i64), Some(0), None, Some(1)], "rate" => [Some(0.5), None, Some(-1.25), Some(0.5)],

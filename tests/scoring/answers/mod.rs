@@ -19,7 +19,7 @@ use mirrorstats_engines::polars::statement::{Table, check};
 use polars::prelude::{IntoLazy as _, df};
 
 use engine::{Duckdb, Rows, Tables, sorted};
-use generate::{Generator, Statement};
+use generate::{Draw, Generator, Statement};
 use mirrorstats_engines::polars::accepted::FUNCTIONS;
 use mirrorstats_engines::polars::answer::{Format, plan};
 use mirrorstats_engines::polars::refused::QueryError;
@@ -128,6 +128,31 @@ fn every_accepted_function_and_cast_has_the_answer_of_duckdb() {
     for (at, signature) in FUNCTIONS.iter().enumerate() {
         assert!(accepted[&at] > 0, "no call of {signature:?} was accepted");
     }
+}
+
+#[test]
+fn floats_of_32_bits_have_the_answer_of_duckdb() {
+    let mut statements = Vec::new();
+    for op in ["=", "<>", "<", "<=", ">", ">="] {
+        for other in ["f", "x", "k", "0", "-2", "0.5", "-0.75", "CAST(0.1 AS DOUBLE)"] {
+            statements.push(format!("SELECT count(*) AS n FROM steps WHERE f {op} {other}"));
+            statements.push(format!("SELECT count(*) AS n FROM steps WHERE {other} {op} f"));
+        }
+    }
+    for name in ["avg", "count", "max", "mean", "min", "stddev", "stddev_samp", "sum", "var_samp", "variance"] {
+        statements.push(format!("SELECT k, {name}(f) AS a FROM steps GROUP BY k"));
+    }
+    for sql in ["SELECT f = 0.1 FROM steps", "SELECT f < 123456789.5 FROM steps", "SELECT f = i FROM steps"] {
+        assert!(matches!(Tables::random(&mut Draw(1)).answer(sql), Err(QueryError::Unsupported(_))), "{sql}");
+    }
+    let mut wrong = Vec::new();
+    for seed in 0..3 {
+        let mut round = Round::new(&mut Generator::new(seed));
+        for sql in &statements {
+            assert!(round.check(&Statement { sql: sql.clone(), ordered: false }, &mut wrong), "{sql}");
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// The answer over four steps as CSV, or the refusal.

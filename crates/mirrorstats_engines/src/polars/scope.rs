@@ -321,7 +321,8 @@ impl<'p, 's> Scope<'p, 's> {
                 arithmetic(&zero, &BinaryOperator::Minus, &value).map_or_else(|| self.unsupported(ast), Ok)
             }
             (UnaryOperator::Minus, Kind::Decimal | Kind::Float, _) => {
-                Ok(Value { expr: value.float() * lit(-1.0), ..value })
+                let negated = value.number().map_or_else(|| value.float() * lit(-1.0), |number| lit(-number));
+                Ok(Value { expr: negated, ..value })
             }
             _ => self.unfit(ast, &[value]),
         }

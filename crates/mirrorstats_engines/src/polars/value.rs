@@ -149,13 +149,20 @@ impl Value {
         matches!(self.expr, Expr::Literal(_)) && self.kind == Kind::Int && self.bits > 0
     }
 
-    /// True for floats, and for literals that 32 bits hold: beside a FLOAT, 64 bits give the answer of DuckDB's 32.
+    /// The number of a literal.
+    pub(super) fn number(&self) -> Option<f64> {
+        let Expr::Literal(literal) = &self.expr else { return None };
+        literal.to_any_value()?.extract()
+    }
+
+    /// True for floats and for numbers that 32 bits hold: beside a FLOAT, 64 bits give the answer of DuckDB's 32.
     fn widens(&self) -> bool {
-        let is_literal = matches!(self.expr, Expr::Literal(_));
+        #[expect(clippy::cast_possible_truncation, clippy::float_cmp, reason = "32 bits hold the number or do not")]
+        let is_single = |number: f64| f64::from(number as f32) == number;
         match self.kind {
             Kind::Real | Kind::Float => true,
-            Kind::Int => is_literal && self.bits <= 24,
-            Kind::Decimal => is_literal && self.bits == 0,
+            Kind::Int => self.bits <= f32::MANTISSA_DIGITS,
+            Kind::Decimal => self.is_exact() && self.number().is_some_and(is_single),
             _ => false,
         }
     }

@@ -4,10 +4,10 @@ use std::io::Cursor;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use mirrorstats_log::assemble;
+use mirrorstats_log::recover::{Recovered, recover_from};
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::log::assemble;
-use mirrorstats_trace::log::recover::{Recovered, recover_from};
 use mirrorstats_trace::validate::validate;
 use mirrorstats_trace::write::OptionalColumns;
 use mirrorstats_trace::write::merge;

@@ -5,6 +5,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mirrorstats_log::message::Decision;
+use mirrorstats_log::write::EpisodeLog;
+use mirrorstats_log::{assemble, topic};
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::file::{built_in, built_in_names};
 use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
@@ -13,9 +16,6 @@ use mirrorstats_score::format::{self, Format};
 use mirrorstats_score::score_traces;
 use mirrorstats_score::vocabulary;
 use mirrorstats_statistics::sample_size::Clusters;
-use mirrorstats_trace::log::message::Decision;
-use mirrorstats_trace::log::write::EpisodeLog;
-use mirrorstats_trace::log::{assemble, topic};
 use mirrorstats_world::agent::vlm::journal::Entry;
 use mirrorstats_world::sim::config::WorldConfig;
 use serde_json::{Value, json};

@@ -4,9 +4,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
+use mirrorstats_import::{Limits, Text, import};
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_trace::import::{Limits, Text, import};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::Projection;

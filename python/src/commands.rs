@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use std::thread::available_parallelism;
 
 use mirrorstats::cli;
+use mirrorstats_import::Text;
 use mirrorstats_study::ImportRequest;
-use mirrorstats_trace::import::Text;
 use mirrorstats_trace::inputs;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use mirrorstats::StudyError;
 use mirrorstats::cli::{ErrorAnswer, Failure};
+use mirrorstats_import::{Fault, ImportError};
 use mirrorstats_toml_spec::FaultRecord;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_trace::import::{Fault, ImportError};
 use pyo3::prelude::*;
 
 /// The error of a study, in the class that shows what to change.

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use mirrorstats::cli::printed_schema;
+use mirrorstats_log::message::{Decision, EpisodeMessage};
 use mirrorstats_metric::logical_plan::explain::Explanation;
 use mirrorstats_metric::shape::DefinitionFile;
 use mirrorstats_report::audit::Audit;
@@ -22,7 +23,6 @@ use mirrorstats_study::verify::Verification;
 use mirrorstats_study::{ImportAnswer, LabelAgreement, QualityCheckAnswer};
 use mirrorstats_trace::episodes::labels::LabelLine;
 use mirrorstats_trace::info::Info;
-use mirrorstats_trace::log::message::{Decision, EpisodeMessage};
 use mirrorstats_trace::schema::describe::SchemaDocument;
 use mirrorstats_trace::validate::Validation;
 use mirrorstats_trace::write::seal::SealAnswer;

@@ -9,6 +9,7 @@ use mirrorstats_engines::spark::SparkError;
 use mirrorstats_exact::budget::Exceeded;
 use mirrorstats_exact::moments::MomentOverflow;
 use mirrorstats_exact::replace::TargetIsInput;
+use mirrorstats_import::ImportError;
 use mirrorstats_metric::definitions::{ReplaceError, UnknownMetric};
 use mirrorstats_metric::file::FileError;
 use mirrorstats_report::audit::AuditError;
@@ -27,7 +28,6 @@ use mirrorstats_score::tables::select::SelectError;
 use mirrorstats_toml_spec::Faults;
 use mirrorstats_trace::episodes::lost::LostListError;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_trace::import::ImportError;
 
 /// An error of a study. Each message gives the problem, the location, the expected and found values, and a remedy.
 #[derive(Debug, thiserror::Error)]

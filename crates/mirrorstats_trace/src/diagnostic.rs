@@ -247,7 +247,7 @@ impl Finding {
         Box::new(Self::new(Code::Unreadable, file, "a file that can be read", found.to_string()))
     }
 
-    pub(crate) fn over_budget(file: &str, exceeded: &Exceeded) -> Self {
+    pub fn over_budget(file: &str, exceeded: &Exceeded) -> Self {
         Self::new(Code::OverBudget, file, exceeded.expected(), "more")
     }
 

@@ -47,7 +47,7 @@ impl TraceError {
         }
     }
 
-    pub(crate) fn write(file: impl AsRef<Path>, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+    pub fn write(file: impl AsRef<Path>, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Write { file: file.as_ref().display().to_string(), source: source.into() }
     }
 

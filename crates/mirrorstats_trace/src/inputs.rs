@@ -142,7 +142,7 @@ fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
     text.map(Into::into).map_err(|source| TraceError::Read { what: "the list on standard input".into(), source })
 }
 
-pub(crate) fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
+pub fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
     }
@@ -171,7 +171,7 @@ fn is_report(folder: &Path) -> bool {
 }
 
 /// The value that marks null in the name of a folder.
-pub(crate) const NULL_FOLDER: &str = "__HIVE_DEFAULT_PARTITION__";
+pub const NULL_FOLDER: &str = "__HIVE_DEFAULT_PARTITION__";
 
 /// The columns in the folder names of a path, as in partitioned tables of Spark and others: `experiment=E1`.
 ///

@@ -6,8 +6,6 @@
 //! | `read` | from bytes to complete episodes: footers, pages, columns, one pass on several threads |
 //! | `write` | from episodes to bytes: new traces, merged traces, sealed copies |
 //! | `validate` | the rules for complete episodes, alone and together |
-//! | `import` | from JSON lines to a trace |
-//! | `log` | MCAP logs of recordings: written, read, recovered |
 //! | `footers` | the declarations of files: clusters, experiments, answering models, checksums |
 //! | `episodes` | one episode: steps, hash, pictures, colours, losses, replies, attributions, names of models |
 //!
@@ -33,10 +31,8 @@ pub mod episodes;
 pub mod error;
 pub mod footers;
 mod glob_paths;
-pub mod import;
 pub mod info;
 pub mod inputs;
-pub mod log;
 pub mod read;
 pub mod renderer;
 pub mod scan;

@@ -5,10 +5,10 @@ use std::io;
 use std::path::PathBuf;
 
 use mirrorstats_exact::escape::{visible, visible_lines};
+use mirrorstats_log::LogError;
 use mirrorstats_study::StudyError;
 use mirrorstats_trace::episodes::labels::LabelsError;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_trace::log::LogError;
 
 /// A folder of copies, and the folder of their originals.
 pub(super) type Renamed = (PathBuf, PathBuf);

@@ -10,11 +10,11 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use super::error::{Renamed, ViewError};
 use mirrorstats_exact::replace::{FolderError, folder_of};
+use mirrorstats_log::frames;
 use mirrorstats_study::resolve;
 use mirrorstats_trace::episodes::labels::list_beside;
 use mirrorstats_trace::episodes::lost::list_of;
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::log::frames;
 
 /// The folder for a recording's finished episodes that are not in the trace yet, and for the one being written.
 const PARTS: &str = ".parts";

@@ -5,10 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use mirrorstats_log::LogError;
+use mirrorstats_log::frames::{self, LogIndex, Moment, SceneShape};
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::log::LogError;
-use mirrorstats_trace::log::frames::{self, LogIndex, Moment, SceneShape};
 use mirrorstats_trace::write::merge::OwnColumn;
 
 /// The number of log indices in memory.

@@ -5,9 +5,9 @@ use std::io::Cursor;
 use std::path::Path;
 
 use arrow::array::{ArrayRef, Int32Array};
+use mirrorstats_log::read::episode_hashes;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::episodes::episode_hash;
-use mirrorstats_trace::log::read::episode_hashes;
 use mirrorstats_trace::schema;
 use mirrorstats_trace::write::OptionalColumns;
 use mirrorstats_trace::write::merge::{self, EpisodeRows};

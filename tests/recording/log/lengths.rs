@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Output;
 
 use mcap::records::{Metadata, op};
-use mirrorstats_trace::log::{METADATA, METADATA_KEY};
+use mirrorstats_log::{METADATA, METADATA_KEY};
 
 use super::logs::{RECORDING, SHORT, ids, recovered};
 use crate::harness::files::write_small_world;

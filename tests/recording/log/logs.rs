@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use std::sync::LazyLock;
 
-use mirrorstats_trace::log::recover::{Recovered, recover_from};
+use mirrorstats_log::recover::{Recovered, recover_from};
 use serde_json::Value;
 use tempfile::TempDir;
 

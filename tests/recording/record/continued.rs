@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use arrow::array::{ArrayRef, Int32Array};
-use mirrorstats_trace::log::recover::recover;
+use mirrorstats_log::recover::recover;
 use mirrorstats_trace::write::merge;
 
 use super::recordings::Bench;

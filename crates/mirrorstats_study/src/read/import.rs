@@ -13,8 +13,8 @@ use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::input;
+use mirrorstats_import::{Limits, Text};
 use mirrorstats_trace::footers::declared::Cluster;
-use mirrorstats_trace::import::{self, Limits, Text};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::Kind;
 use mirrorstats_trace::schema::colors::palette::Palette;
@@ -72,7 +72,7 @@ pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAns
         cluster: request.clusters_by_seed.then_some(Cluster::Seed),
         is_reconstruction: request.reconstruction,
     };
-    let imported = import::import(&mut texts, &request.out, limits)?;
+    let imported = mirrorstats_import::import(&mut texts, &request.out, limits)?;
     let own = imported.own.into_iter().map(|own| OwnColumn { name: own.name, kind: own.kind });
     Ok(ImportAnswer {
         out: Input::new(&request.out).name,

@@ -12,7 +12,7 @@ use serde_json::Value as Json;
 use crate::schema::{Column, DeclaredColumn, Kind, Stored, Value};
 
 /// The prefixes of the column names: of the answer, and of its truth.
-pub(crate) const PREFIXES: [&str; 2] = ["answer_", "truth_"];
+pub const PREFIXES: [&str; 2] = ["answer_", "truth_"];
 
 pub const MOST_ANSWERS: usize = 8;
 
@@ -64,7 +64,7 @@ pub fn columns_of(key: &str) -> [String; 2] {
 }
 
 /// Returns true if a column of this name may belong to an answer.
-pub(crate) fn is_answer(name: &str) -> bool {
+pub fn is_answer(name: &str) -> bool {
     // `answer_truth` belongs to the schema.
     PREFIXES.iter().any(|prefix| name.starts_with(prefix)) && crate::schema::column(name).is_none()
 }

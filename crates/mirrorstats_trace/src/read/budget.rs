@@ -41,16 +41,6 @@ pub(crate) const fn most_shown(bytes: u64) -> Limit {
     Limit::new("bytes of an episode that is shown", 48 << 20).and_beyond(1 << 20, 64, bytes)
 }
 
-/// The most values that an import reads one by one: rows of constant columns take no bytes.
-pub(crate) const fn most_imported(bytes: u64) -> Limit {
-    Limit::in_proportion("rows times columns of a file of its size", 8_000_000, 16, bytes)
-}
-
-/// The most bytes of rows that an import stores between its passes.
-pub(crate) const fn most_stored(bytes: u64) -> Limit {
-    Limit::in_proportion("bytes of rows in a file of its size", 512 << 20, 256, bytes)
-}
-
 /// The number of episodes read from a file so far. Repeated reads count once.
 #[derive(Debug)]
 pub(crate) struct EpisodeBudget {

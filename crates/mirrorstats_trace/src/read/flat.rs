@@ -27,7 +27,7 @@ pub type TableFile = File;
 pub struct FlatRows(CheckedRows);
 
 /// Rows from the library's reader. A panic or an error of the library is a finding of the file.
-pub(crate) struct CheckedRows {
+pub struct CheckedRows {
     file: String,
     reader: ParquetRecordBatchReader,
     slot: FaultSlot,
@@ -74,7 +74,7 @@ impl FlatRows {
 }
 
 /// The rows of these columns of a file, by their positions; of all columns if `None`.
-pub(crate) fn table_rows(
+pub fn table_rows(
     name: &str,
     file: TableFile,
     metadata: Arc<ParquetMetaData>,

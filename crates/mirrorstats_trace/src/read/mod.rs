@@ -3,7 +3,7 @@ mod checks;
 pub(crate) mod decode;
 mod episode_index;
 pub mod flat;
-pub(crate) mod footer;
+pub mod footer;
 pub mod in_order;
 pub mod open;
 pub(crate) mod parallel_scan;

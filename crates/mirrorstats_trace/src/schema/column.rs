@@ -112,7 +112,7 @@ mirrorstats_exact::names!(Stored {
 
 impl Kind {
     /// The widest type of its values, as writers and checks hold them.
-    pub(crate) const fn data_type(self) -> DataType {
+    pub const fn data_type(self) -> DataType {
         match self {
             Self::Bool => DataType::Boolean,
             Self::Int => DataType::Int64,

@@ -120,7 +120,7 @@ impl Rule<'_> {
         }
     }
 
-    pub(crate) fn allows(&self, text: &str) -> bool {
+    pub fn allows(&self, text: &str) -> bool {
         match self.asks {
             Requirement::Name => !text.is_empty(),
             Requirement::OneOf(values) => values.contains(&text),

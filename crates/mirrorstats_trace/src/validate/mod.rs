@@ -65,7 +65,7 @@ pub struct Rest<'a> {
 
 impl Validation {
     /// The error with the findings that are errors, the earliest first.
-    pub(crate) fn errors(self) -> Result<(), TraceError> {
+    pub fn errors(self) -> Result<(), TraceError> {
         let errors = self.findings.into_iter().filter(|finding| finding.severity == Severity::Error);
         TraceError::of(errors.collect()).map_or(Ok(()), Err)
     }

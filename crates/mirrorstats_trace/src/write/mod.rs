@@ -7,7 +7,7 @@
 
 pub(crate) mod decode_episode;
 pub mod merge;
-pub(super) mod row_groups;
+pub mod row_groups;
 pub mod seal;
 
 use std::collections::{BTreeMap, HashSet};

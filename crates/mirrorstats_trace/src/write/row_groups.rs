@@ -24,18 +24,18 @@ const ROW_GROUP_ROWS: usize = 128 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
 
-pub(crate) struct RowGroups<W: Write + Send> {
+pub struct RowGroups<W: Write + Send> {
     parquet: ArrowWriter<Held<W>>,
     rows: usize,
 }
 
-pub(crate) struct Gathered {
-    pub(crate) layout: SchemaRef,
-    pub(crate) columns: Vec<Values>,
-    pub(crate) rows: usize,
+pub struct Gathered {
+    pub layout: SchemaRef,
+    pub columns: Vec<Values>,
+    pub rows: usize,
 }
 
-pub(crate) enum Values {
+pub enum Values {
     Bool(BooleanBuilder),
     Int(Int64Builder),
     Float(Float64Builder),
@@ -44,19 +44,19 @@ pub(crate) enum Values {
 }
 
 impl<W: Write + Send> RowGroups<W> {
-    pub(crate) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
+    pub fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
         // Parquet's logical types are complete; an embedded Arrow schema would only pin one library's view.
         let options = ArrowWriterOptions::new().with_properties(properties(recording)).with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(Held::new(out), Arc::clone(layout), options)?;
         Ok(Self { parquet, rows: 0 })
     }
 
-    pub(crate) fn end_episode(&mut self, gathered: &mut Gathered) -> Result<()> {
+    pub fn end_episode(&mut self, gathered: &mut Gathered) -> Result<()> {
         let is_full = self.rows + gathered.rows >= ROW_GROUP_ROWS;
         if is_full || gathered.rows >= GATHERED_ROWS { self.write(&gathered.take()?) } else { Ok(()) }
     }
 
-    pub(crate) fn write(&mut self, rows: &RecordBatch) -> Result<()> {
+    pub fn write(&mut self, rows: &RecordBatch) -> Result<()> {
         self.parquet.write(rows)?;
         self.rows += rows.num_rows();
         if self.rows >= ROW_GROUP_ROWS {
@@ -94,17 +94,17 @@ fn properties(recording: Option<&serde_json::Value>) -> WriterProperties {
 }
 
 impl Gathered {
-    pub(crate) fn new(columns: impl IntoIterator<Item = (Field, Option<Kind>)>) -> Self {
+    pub fn new(columns: impl IntoIterator<Item = (Field, Option<Kind>)>) -> Self {
         let (fields, kinds): (Vec<Field>, Vec<Option<Kind>>) = columns.into_iter().unzip();
         let columns = kinds.into_iter().map(Values::new).collect();
         Self { layout: Arc::new(Schema::new(fields)), columns, rows: 0 }
     }
 
-    pub(crate) fn of_columns<'a>(columns: impl IntoIterator<Item = &'a Column>) -> Self {
+    pub fn of_columns<'a>(columns: impl IntoIterator<Item = &'a Column>) -> Self {
         Self::new(columns.into_iter().map(|column| (field(column), Some(column.stored.kind()))))
     }
 
-    pub(crate) fn take(&mut self) -> Result<RecordBatch, ArrowError> {
+    pub fn take(&mut self) -> Result<RecordBatch, ArrowError> {
         self.rows = 0;
         let columns = self.columns.iter_mut().zip(self.layout.fields());
         let columns = columns.map(|(values, field)| cast(&values.take(), field.data_type()));
@@ -123,7 +123,9 @@ impl Values {
         }
     }
 
-    pub(crate) fn push(&mut self, value: Option<Value<'_>>) -> Result<(), ()> {
+    /// Adds a value; `None` if it is of another type.
+    #[must_use]
+    pub fn push(&mut self, value: Option<Value<'_>>) -> Option<()> {
         match (self, value) {
             (Self::Bool(values), None) => values.append_null(),
             (Self::Int(values), None) => values.append_null(),
@@ -134,9 +136,9 @@ impl Values {
             (Self::Int(values), Some(Value::Int(value))) => values.append_value(value),
             (Self::Float(values), Some(Value::Float(value))) => values.append_value(value),
             (Self::Text(values), Some(Value::Text(text))) => values.append_value(text),
-            _ => return Err(()),
+            _ => return None,
         }
-        Ok(())
+        Some(())
     }
 
     fn take(&mut self) -> ArrayRef {
@@ -150,6 +152,6 @@ impl Values {
     }
 }
 
-pub(crate) fn field(column: &Column) -> Field {
+pub fn field(column: &Column) -> Field {
     Field::new(column.name, column.stored.data_type(), column.nullable)
 }

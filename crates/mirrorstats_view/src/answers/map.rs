@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::filter::{Query, required};
 use crate::{Snapshot, ViewError};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_trace::log::frames::{SceneShape, hull};
+use mirrorstats_log::frames::{SceneShape, hull};
 
 /// The maximum number of distinct shapes in an answer, about 600 kB.
 const MOST: usize = 12_000;
@@ -155,7 +155,7 @@ fn whole(value: f64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::{MOST, Map};
-    use mirrorstats_trace::log::frames::SceneShape;
+    use mirrorstats_log::frames::SceneShape;
 
     fn shape(name: &str, x: f64) -> SceneShape {
         SceneShape {

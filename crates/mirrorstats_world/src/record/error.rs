@@ -3,8 +3,8 @@ use std::path::{Path, PathBuf};
 
 use super::metadata::Difference;
 use crate::agent::Lost;
+use mirrorstats_log::LogError;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_trace::log::LogError;
 
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {

@@ -8,13 +8,13 @@ use super::error::ReplayError;
 use super::frames::rendered;
 use super::moments::{chosen, moments};
 use mirrorstats_exact::budget::Limit;
+use mirrorstats_log::message::EpisodeMessage;
+use mirrorstats_log::read::{Event, LogReader, png};
+use mirrorstats_log::recover::ended;
 use mirrorstats_report::figures::Figure;
 use mirrorstats_report::figures::film_strip::{Still, film_strip};
 use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::log::message::EpisodeMessage;
-use mirrorstats_trace::log::read::{Event, LogReader, png};
-use mirrorstats_trace::log::recover::ended;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::write::merge::{self, EpisodeRows};
 

@@ -9,10 +9,10 @@ use serde_json::Value;
 use crate::sim::snapshot::{self, Shape};
 use crate::sim::visibility::Visibility;
 use crate::sim::world::World;
+use mirrorstats_log::message::Decision;
+use mirrorstats_log::write::{EpisodeLog, Form, Solid, View};
 use mirrorstats_trace::episodes::episode::{Episode, Step};
 use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_trace::log::message::Decision;
-use mirrorstats_trace::log::write::{EpisodeLog, Form, Solid, View};
 
 static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
 

@@ -6,7 +6,7 @@ use super::angle::Quaternion;
 use super::body::Piece;
 use super::model::{AGENTS, EYE_CAMERA, Item, Stage};
 use super::world::World;
-use mirrorstats_trace::log::write::Placed;
+use mirrorstats_log::write::Placed;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use crate::cli::{Failure, Outcome, output};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use mirrorstats_exact::replace;
+use mirrorstats_import::{Format, Mapping, Text};
 use mirrorstats_study::ImportRequest;
-use mirrorstats_trace::import::{Format, Mapping, Text};
 
 /// Make a trace of another harness's steps or logs
 ///

@@ -11,9 +11,9 @@ use serde_json::Value;
 
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
+use mirrorstats_log::recover::{Losses, recover};
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::log::recover::{Losses, recover};
 use mirrorstats_trace::read::open::TraceFile;
 use mirrorstats_trace::validate::validate;
 use mirrorstats_trace::write::OptionalColumns;

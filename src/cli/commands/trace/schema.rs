@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 
 use crate::cli::{Failure, Outcome, terminal};
 use mirrorstats_report::tables::Table;
-use mirrorstats_trace::import;
 use mirrorstats_trace::schema::Column;
 use mirrorstats_trace::schema::describe::SchemaDocument;
 use mirrorstats_world::agent::reply;
@@ -48,7 +47,7 @@ impl Name {
     pub fn document(self) -> Value {
         match self {
             Self::Trace => json!(SchemaDocument::current()),
-            Self::Step => import::schema::document(),
+            Self::Step => mirrorstats_import::schema::document(),
             Self::Experiments => json!(schema_for!(ExperimentFile)),
             Self::Experiment => json!(schema_for!(Spec)),
             Self::ReplyCubes => reply::schema("Reply in E1 to E4", &Experiment::E1),

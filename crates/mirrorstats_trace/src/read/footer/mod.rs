@@ -26,7 +26,7 @@ const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
 const SMALLEST: u64 = 12;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Extent {
+pub enum Extent {
     Pages,
     Whole,
 }
@@ -43,11 +43,11 @@ impl Extent {
     }
 }
 
-pub(crate) struct Footer {
-    pub(crate) bytes: u64,
-    pub(crate) metadata: ParquetMetaData,
+pub struct Footer {
+    pub bytes: u64,
+    pub metadata: ParquetMetaData,
     pub(crate) checksums: Checksums,
-    pub(crate) chunks: ChunkChecksums,
+    pub chunks: ChunkChecksums,
 }
 
 pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Finding>> {
@@ -56,7 +56,7 @@ pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Findin
 }
 
 /// The footer of an open file of this name.
-pub(crate) fn footer_of(name: &str, file: &mut File, extent: Extent) -> Result<Footer, Box<Finding>> {
+pub fn footer_of(name: &str, file: &mut File, extent: Extent) -> Result<Footer, Box<Finding>> {
     let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, name, expected, found));
     let unreadable = |error: io::Error| Finding::unreadable(name, &error);
     let about = file.metadata().map_err(unreadable)?;

@@ -33,7 +33,7 @@ impl ColorColumn {
         }
     }
 
-    pub(crate) fn expected(self, palette: Option<&Palette>) -> String {
+    pub fn expected(self, palette: Option<&Palette>) -> String {
         let colors = match palette {
             Some(palette) => format!("a colour of the palette ({})", listed(palette)),
             None => "the lower-case name of a colour".to_owned(),

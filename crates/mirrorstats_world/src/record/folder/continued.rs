@@ -10,11 +10,11 @@ use serde_json::{Value, json};
 
 use super::super::error::StoreError;
 use super::super::metadata::{Difference, difference};
+use mirrorstats_log::LogError;
+use mirrorstats_log::message::Decision;
+use mirrorstats_log::recover::{Recovered, recover};
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_trace::log::LogError;
-use mirrorstats_trace::log::message::Decision;
-use mirrorstats_trace::log::recover::{Recovered, recover};
 use mirrorstats_trace::write::OptionalColumns;
 use mirrorstats_trace::write::merge::{self, EpisodeRows};
 

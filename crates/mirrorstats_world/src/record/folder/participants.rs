@@ -12,8 +12,8 @@ use super::super::index::recording_of;
 use super::super::lock::{FolderLock, WRITING, parts_of};
 use crate::agent::human::journal;
 use crate::agent::locked;
+use mirrorstats_log::assemble;
 use mirrorstats_trace::episodes::labels;
-use mirrorstats_trace::log::assemble;
 use mirrorstats_trace::write::merge::{self, EpisodeRows};
 
 /// The removed episodes.

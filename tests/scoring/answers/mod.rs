@@ -18,7 +18,7 @@ use mirrorstats_engines::polars::shared_file::in_memory;
 use mirrorstats_engines::polars::statement::{Table, check};
 use polars::prelude::{IntoLazy as _, df};
 
-use engine::{Duckdb, Rows, Tables, sorted};
+use engine::{Cell, Duckdb, Rows, Tables, sorted};
 use generate::{Draw, Generator, Statement};
 use mirrorstats_engines::polars::accepted::FUNCTIONS;
 use mirrorstats_engines::polars::answer::{Format, plan};
@@ -52,13 +52,11 @@ impl Round {
             Ok(expected) => {
                 let arranged = |rows: Rows| if *ordered { rows } else { sorted(rows) };
                 let (found, expected) = (arranged(found), arranged(expected));
-                let same = found.len() == expected.len()
-                    && found
-                        .iter()
-                        .zip(&expected)
-                        .all(|(a, b)| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.same(b)));
-                if !same {
-                    let at = found.iter().zip(&expected).position(|(a, b)| !a.iter().zip(b).all(|(a, b)| a.same(b)));
+                let in_order = |found: &Rows| found.iter().zip(&expected).all(|(a, b)| same(a, b));
+                let is_same = found.len() == expected.len()
+                    && (in_order(&found) || !*ordered && same_in_any_order(found.clone(), &expected));
+                if !is_same {
+                    let at = found.iter().zip(&expected).position(|(a, b)| !same(a, b));
                     let row = |rows: &Rows| at.map(|at| format!("{:?}", rows[at])).unwrap_or_default();
                     wrong.push(format!(
                         "{sql}\n  {} rows, {}\n  DuckDB {} rows, {}",
@@ -71,10 +69,24 @@ impl Round {
             }
             // DuckDB keeps 32 bits where this engine has 64.
             Err(error) if error.contains("Overflow") || error.contains("Out of Range") => {}
+            // DuckDB 2.0 fails to bind some calls of `lead` within conditions: its own fault, and no answer.
+            Err(error) if error.contains("did not return a BoundFunctionExpression") => {}
             Err(error) => wrong.push(format!("{sql}\n  accepted; DuckDB: {error}")),
         }
         true
     }
+}
+
+fn same(found: &[Cell], expected: &[Cell]) -> bool {
+    found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| a.same(b))
+}
+
+/// Rows are sorted by their values, and two values that differ by rounding alone may sort differently.
+fn same_in_any_order(mut found: Rows, expected: &Rows) -> bool {
+    expected.iter().all(|row| {
+        let at = found.iter().position(|other| same(other, row));
+        at.map(|at| found.swap_remove(at)).is_some()
+    })
 }
 
 fn report(wrong: &[String], counts: (usize, usize)) {

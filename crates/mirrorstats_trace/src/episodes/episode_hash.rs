@@ -23,16 +23,16 @@ pub(crate) const IDENTIFICATION: &str = "identification";
 
 /// The hash of an episode, 64 hexadecimal digits; ignores the field for the hash.
 pub fn of(episode: &Episode) -> String {
-    let mut form = CanonicalForm::new();
+    let (mut form, mut lines) = (CanonicalForm::new(), Vec::new());
     for column in columns().filter_map(schema::column) {
         let derived = |at: usize| column.name == SELF_COLOR && episode.steps[at].extra.identification.is_some();
         let values = column.of_steps(episode).enumerate();
-        form.add(column.name, values.map(|(at, value)| value.filter(|_| !derived(at))));
+        form.add(&mut lines, column.name, values.map(|(at, value)| value.filter(|_| !derived(at))));
     }
     let answers = || episode.steps.iter().map(|step| &step.extra.answers);
     let names: BTreeSet<&String> = answers().flat_map(BTreeMap::keys).collect();
     for name in names {
-        form.add(name, answers().map(|cells| cells.get(name).map(Answered::value)));
+        form.add(&mut lines, name, answers().map(|cells| cells.get(name).map(Answered::value)));
     }
     form.finish()
 }
@@ -44,51 +44,49 @@ pub(crate) fn columns() -> impl Iterator<Item = &'static str> {
     names.into_iter()
 }
 
-pub(crate) struct CanonicalForm {
-    hasher: Sha256,
-    lines: Vec<u8>,
-}
+pub(crate) struct CanonicalForm(Sha256);
 
 impl CanonicalForm {
     pub(crate) fn new() -> Self {
-        Self { hasher: Sha256::new_with_prefix("mirrorstats.episode 1\n"), lines: Vec::new() }
+        Self(Sha256::new_with_prefix("mirrorstats.episode 1\n"))
     }
 
-    pub(crate) fn add<'a>(&mut self, name: &str, values: impl Iterator<Item = Option<Value<'a>>>) {
-        self.lines.clear();
-        self.lines.extend_from_slice(format!("column {name}\n").as_bytes());
+    /// Adds a column; `lines` is room for its text.
+    pub(crate) fn add<'a>(&mut self, lines: &mut Vec<u8>, name: &str, values: impl Iterator<Item = Option<Value<'a>>>) {
+        lines.clear();
+        lines.extend_from_slice(format!("column {name}\n").as_bytes());
         let (mut run, mut has_value) = (None, false);
         for value in values {
             has_value |= value.is_some();
             run = match run {
                 Some((before, count)) if same(before, value) => Some((before, count + 1)),
                 before => {
-                    self.line(before);
+                    line(lines, before);
                     Some((value, 1))
                 }
             };
         }
-        self.line(run);
+        line(lines, run);
         if has_value {
-            self.hasher.update(&self.lines);
+            self.0.update(&lines);
         }
     }
 
-    fn line(&mut self, run: Option<(Option<Value<'_>>, usize)>) {
-        let Some((value, count)) = run else { return };
-        let written = match value {
-            None => writeln!(self.lines, "{count} null"),
-            Some(Value::Bool(truth)) => writeln!(self.lines, "{count} {truth}"),
-            Some(Value::Int(number)) => writeln!(self.lines, "{count} {number}"),
-            Some(Value::Float(number)) => writeln!(self.lines, "{count} {:016x}", number.to_bits()),
-            Some(Value::Text(text)) => writeln!(self.lines, "{count} {}:{text}", text.len()),
-        };
-        written.expect("a vector takes all bytes");
-    }
-
     pub fn finish(self) -> String {
-        hex(&self.hasher.finalize())
+        hex(&self.0.finalize())
     }
+}
+
+fn line(lines: &mut Vec<u8>, run: Option<(Option<Value<'_>>, usize)>) {
+    let Some((value, count)) = run else { return };
+    let written = match value {
+        None => writeln!(lines, "{count} null"),
+        Some(Value::Bool(truth)) => writeln!(lines, "{count} {truth}"),
+        Some(Value::Int(number)) => writeln!(lines, "{count} {number}"),
+        Some(Value::Float(number)) => writeln!(lines, "{count} {:016x}", number.to_bits()),
+        Some(Value::Text(text)) => writeln!(lines, "{count} {}:{text}", text.len()),
+    };
+    written.expect("a vector takes all bytes");
 }
 
 /// Returns true if two values have the same bits.

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use crate::harness::bombs::{
     MEMORY, definitions, large_log, long_episode, long_texts, many_colors, many_episodes, many_models, measured,
+    wide_episode,
 };
 use crate::harness::files::{fixture, repository};
 
@@ -48,6 +49,7 @@ const WITHOUT_INPUT: [(&str, &str); 9] = [
 const EPISODE: Walk = Walk {
     inputs: |at| {
         long_episode(&at.join("a.parquet"), 4_000_000);
+        wide_episode(&at.join("wide.parquet"), 3_000_000);
         definitions(&at.join("some.toml"), 20, |at| format!("sum(t * {})", at + 2));
         definitions(&at.join("many.toml"), 500, |at| format!("sum(t * {})", at + 2));
     },
@@ -55,8 +57,11 @@ const EPISODE: Walk = Walk {
         ("trace info a.parquet", Answer),
         ("trace validate a.parquet", Answer),
         ("trace check a.parquet --max-unreadable 0.05", Answer),
+        ("trace validate wide.parquet", Limit("steps times columns of an episode")),
         ("trace seal a.parquet sealed.parquet", Answer),
+        ("trace seal wide.parquet sealed.parquet", Limit("steps times columns of an episode")),
         ("score a.parquet -o scores.csv", Answer),
+        ("score wide.parquet -o scores.csv", Answer),
         ("definitions sensitivity a.parquet", Invalid),
         ("view a.parquet --export page", Limit("steps times columns of an episode")),
         ("score a.parquet --definitions some.toml -o s.csv", Limit("bytes of values of the definitions")),

@@ -87,6 +87,13 @@ pub fn long_episode(path: &Path, steps: usize) {
     write(path, steps, vec![("t", integers(1..=steps))]);
 }
 
+/// One episode with this number of steps and eight texts that are the same in each of them.
+pub fn wide_episode(path: &Path, steps: usize) {
+    let texts = ["condition", "fingerprint", "reasoning", "reply", "scene", "summary", "view_description", "word"];
+    let texts = texts.map(|name| (name, same("the same", steps)));
+    write(path, steps, [("t", integers(1..=steps))].into_iter().chain(texts).collect());
+}
+
 /// One episode with a text of 900 bytes in each step.
 pub fn long_texts(path: &Path, steps: usize) {
     let text = format!("I am red. {}", "x".repeat(890));

@@ -31,6 +31,11 @@ pub(crate) const fn most_listed(bytes: u64) -> Limit {
     Limit::in_proportion("episodes in a list of files of their size", 100_000, 1, bytes / 8)
 }
 
+/// The most values of an episode whose rows are read in parts and joined: each takes up to 8 bytes.
+pub(crate) const fn most_joined(bytes: u64) -> Limit {
+    Limit::new("steps times columns of an episode", 48_000_000).and_beyond(1 << 20, 8, bytes)
+}
+
 /// The most values of an episode held row by row: its steps times the columns of its file.
 pub(crate) const fn most_values(bytes: u64) -> Limit {
     Limit::new("steps times columns of an episode that is shown", 2_000_000).and_beyond(1 << 20, 4, bytes)

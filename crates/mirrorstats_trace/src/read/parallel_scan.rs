@@ -14,7 +14,7 @@ use std::thread;
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
 
-use super::budget::LONGEST_EPISODE;
+use super::budget::{LONGEST_EPISODE, most_joined};
 use super::decode::{Ids, RowGroup, Rows};
 use super::episode_index::Ahead;
 use super::footer::trace_file::{Readable, TraceFile};
@@ -347,8 +347,10 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, ScanEvent<T>)
 
 fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
     let steps: usize = open.iter().map(Rows::len).sum();
-    let exceeded = LONGEST_EPISODE.check(steps as u64).err()?;
-    let finding = Finding::over_budget(file.name(), &exceeded).in_row_group(open.first()?.row_group);
+    let first = open.first()?;
+    let values = steps * first.columns.len();
+    let checked = LONGEST_EPISODE.check(steps as u64).and_then(|()| most_joined(file.bytes()).check(values as u64));
+    let finding = Finding::over_budget(file.name(), &checked.err()?).in_row_group(first.row_group);
     Some(Box::new(finding))
 }
 

@@ -12,7 +12,7 @@ use mirrorstats_report::style::Style;
 use mirrorstats_score::format::{self, Format, Partition};
 use mirrorstats_score::vocabulary;
 use mirrorstats_toml_spec::Source;
-use mirrorstats_trace::episodes::lost;
+use mirrorstats_trace::beside::lost;
 use mirrorstats_world::experiment::file;
 use mirrorstats_world::experiment::spec::Spec;
 use mirrorstats_world::sim::config::WorldConfig;

@@ -21,7 +21,7 @@ use mirrorstats_report::style::StyleSheet;
 use mirrorstats_score::evidence::Evidence;
 use mirrorstats_study::verify::Verification;
 use mirrorstats_study::{ImportAnswer, LabelAgreement, QualityCheckAnswer};
-use mirrorstats_trace::episodes::labels::LabelLine;
+use mirrorstats_trace::beside::label_line::LabelLine;
 use mirrorstats_trace::info::Info;
 use mirrorstats_trace::schema::describe::SchemaDocument;
 use mirrorstats_trace::validate::Validation;

@@ -8,14 +8,17 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-use mcap::records::{MessageHeader, Record};
+use foxglove::Decode as _;
+use foxglove::messages::{Color, Pose, Quaternion, SceneEntity, SceneUpdate, Vector3};
+use mcap::Message;
+use mcap::records::Record;
 use serde::Serialize;
 
 use super::chunk::{Budgets, inside};
 use super::error::LogError;
 use super::message::EpisodeMessage;
-use super::read::{Event, event, png};
-use super::records::{RecordPiece, Records};
+use super::read::{Event, Messages, event, png};
+use super::records::Records;
 use super::topic;
 use mirrorstats_trace::episodes::episode::{Episode, Step};
 
@@ -56,12 +59,6 @@ pub struct SceneShape {
     pub height: f64,
 }
 
-/// The readable part of a log that is still being written.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Unfinished {
-    pub episode: Episode,
-}
-
 impl LogIndex {
     /// Reads the index of a log; `None` for an unfinished log, which has none.
     pub fn open(path: &Path) -> Result<Option<Self>, LogError> {
@@ -83,56 +80,23 @@ impl LogIndex {
         Ok((!chunks.is_empty()).then(|| Self { path: path.to_owned(), topics, chunks }))
     }
 
-    /// The log's record of an episode's step at this time, ns; `None` if it has none.
-    pub fn step(&self, episode_id: &str, time: u64) -> Result<Option<Moment>, LogError> {
-        let mut records = Records::open(&self.path)?;
-        for chunk in self.chunks.iter().filter(|chunk| (chunk.first..=chunk.last).contains(&time)) {
-            let mut moments = self.moments(&mut records, chunk, episode_id, |header| header.log_time == time)?;
-            if let Some(moment) = moments.remove(&time) {
-                return Ok(Some(moment));
-            }
-        }
-        Ok(None)
-    }
-
-    /// Passes on the shapes of an episode's steps at these times, ns, in order; steps that the log does not have are
-    /// left out.
-    pub fn each_shapes(
-        &self,
-        episode_id: &str,
-        times: &BTreeSet<u64>,
-        give: &mut dyn FnMut(u64, Vec<SceneShape>),
-    ) -> Result<(), LogError> {
-        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
-        let mut records = Records::open(&self.path)?;
-        let is_wanted =
-            |header: &MessageHeader| times.contains(&header.log_time) && self.is_of(header.channel_id, topic::SCENE);
-        for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
-            for record in self.messages(&mut records, chunk, episode_id, is_wanted)? {
-                if let Record::Message { header, data } = record {
-                    give(header.log_time, shapes(&data));
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Passes on the log's records of an episode's steps at these times, ns, in order, in one reading.
+    /// Passes on the log's records of an episode's steps at these times, ns, in order; true if it has any.
     pub fn each_moment(
         &self,
         episode_id: &str,
         times: &BTreeSet<u64>,
         give: &mut dyn FnMut(u64, Moment),
-    ) -> Result<(), LogError> {
-        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(()) };
+    ) -> Result<bool, LogError> {
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(false) };
         let mut records = Records::open(&self.path)?;
+        let mut has_any = false;
         for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
-            let moments = self.moments(&mut records, chunk, episode_id, |header| times.contains(&header.log_time))?;
-            for (time, moment) in moments {
+            for (time, moment) in self.moments(&mut records, chunk, episode_id, times)? {
                 give(time, moment);
+                has_any = true;
             }
         }
-        Ok(())
+        Ok(has_any)
     }
 
     /// The wanted steps of a chunk by time, ns.
@@ -141,56 +105,22 @@ impl LogIndex {
         records: &mut Records<BufReader<File>>,
         chunk: &ChunkTimes,
         episode_id: &str,
-        is_wanted: impl Fn(&MessageHeader) -> bool,
+        times: &BTreeSet<u64>,
     ) -> Result<BTreeMap<u64, Moment>, LogError> {
-        let mut moments: BTreeMap<u64, Moment> = BTreeMap::new();
-        for record in self.messages(records, chunk, episode_id, is_wanted)? {
-            if let Record::Message { header, data } = record
-                && let Some(topic) = self.topics.get(&header.channel_id)
-                && topic != topic::EPISODE
-            {
-                add(moments.entry(header.log_time).or_default(), topic, &data);
-            }
-        }
-        Ok(moments)
-    }
-
-    /// The wanted messages of a chunk; frames, which are most of its bytes, are not kept unless wanted.
-    fn messages(
-        &self,
-        records: &mut Records<BufReader<File>>,
-        chunk: &ChunkTimes,
-        episode_id: &str,
-        is_wanted: impl Fn(&MessageHeader) -> bool,
-    ) -> Result<Vec<Record<'static>>, LogError> {
         let bytes = records.chunk_at(chunk.at).map_err(LogError::io("read", &self.path))?;
         let bytes = bytes.ok_or_else(|| self.damaged("its index names a chunk that is not there"))?;
         let unpacked = inside(&bytes, &Budgets::new(records.end)).map_err(|fault| self.damaged(&fault))?;
-        let (mut kept, mut begun) = (Vec::new(), Vec::new());
+        let (mut moments, mut begun) = (BTreeMap::new(), Vec::new());
         for record in unpacked {
-            let Record::Message { header, data } = &record else { continue };
-            begun.extend(self.begins(header, data).map(|id| id == episode_id));
-            if is_wanted(header) {
-                kept.push(record);
+            let Record::Message { header, data } = record else { continue };
+            let Some(topic) = self.topics.get(&header.channel_id) else { continue };
+            if let Ok(Event::Episode(EpisodeMessage::Begin(head))) = event(topic, &data) {
+                begun.push(head.episode_id == episode_id);
             }
+            add(&mut moments, times, (topic, header.log_time, &data));
         }
         // If only other episodes begin in a chunk, it belongs to them. If none begins, the time decides.
-        Ok(if !begun.is_empty() && !begun.contains(&true) { Vec::new() } else { kept })
-    }
-
-    /// The id of the episode that a message starts.
-    fn begins(&self, header: &MessageHeader, data: &[u8]) -> Option<String> {
-        if !self.is_of(header.channel_id, topic::EPISODE) {
-            return None;
-        }
-        match event(topic::EPISODE, data) {
-            Ok(Event::Episode(EpisodeMessage::Begin(head))) => Some(head.episode_id),
-            _ => None,
-        }
-    }
-
-    fn is_of(&self, channel: u16, topic: &str) -> bool {
-        self.topics.get(&channel).is_some_and(|found| found == topic)
+        Ok(if !begun.is_empty() && !begun.contains(&true) { BTreeMap::new() } else { moments })
     }
 
     fn damaged(&self, fault: &str) -> LogError {
@@ -198,68 +128,54 @@ impl LogIndex {
     }
 }
 
-/// The episode of a log that is still being written; `None` if not even its start is readable.
-pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, LogError> {
+/// The readable steps of the episode of a log that is still being written; `None` if not even its start is readable.
+pub fn unfinished(path: &Path) -> Result<Option<Episode>, LogError> {
     let (mut head, mut steps): (Option<Episode>, Vec<Step>) = (None, Vec::new());
-    each_message(path, |topic, _, data| match event(topic, data) {
+    each_message(path, |message| match event(&message.channel.topic, &message.data) {
         Ok(Event::Episode(EpisodeMessage::Begin(found))) if head.is_none() => head = Some(*found),
         Ok(Event::Decision(row)) => steps.extend(row.into_step().ok()),
         _ => {}
     })?;
-    Ok(head.map(|head| Unfinished { episode: Episode { steps, ..head } }))
+    Ok(head.map(|head| Episode { steps, ..head }))
 }
 
-/// The record of the step at this time, ns, in a log that is still being written.
-pub fn unfinished_step(path: &Path, time: u64) -> Result<Option<Moment>, LogError> {
-    let mut found: Option<Moment> = None;
-    each_message(path, |topic, at, data| {
-        if at == time {
-            add(found.get_or_insert_default(), topic, data);
-        }
+/// Passes on the records of the steps at these times, ns, in a log that is still being written.
+pub fn each_unfinished_moment(
+    path: &Path,
+    times: &BTreeSet<u64>,
+    give: &mut dyn FnMut(u64, Moment),
+) -> Result<(), LogError> {
+    let mut moments = BTreeMap::new();
+    each_message(path, |message| {
+        add(&mut moments, times, (&message.channel.topic, message.log_time, &message.data));
     })?;
-    Ok(found)
-}
-
-/// Passes on the shapes of the steps of a log that is still being written, by time, ns.
-pub fn each_unfinished_shapes(path: &Path, give: &mut dyn FnMut(u64, Vec<SceneShape>)) -> Result<(), LogError> {
-    each_message(path, |topic, at, data| {
-        if topic == topic::SCENE {
-            give(at, shapes(data));
-        }
-    })
+    for (time, moment) in moments {
+        give(time, moment);
+    }
+    Ok(())
 }
 
 pub fn is_log(path: &Path) -> bool {
     Records::open(path).is_ok()
 }
 
-fn each_message(path: &Path, mut give: impl FnMut(&str, u64, &[u8])) -> Result<(), LogError> {
-    let mut records = Records::open(path)?;
-    let mut topics = BTreeMap::new();
-    while let Some(piece) = records.next().map_err(LogError::io("read", path))? {
-        let messages = match piece {
-            RecordPiece::Chunk(_, bytes) => inside(&bytes, &records.budgets).unwrap_or_default(),
-            RecordPiece::Cut(..) => break,
-            RecordPiece::Record(_) | RecordPiece::Damage(_) => continue,
-        };
-        for record in messages {
-            match record {
-                Record::Channel(channel) => {
-                    topics.insert(channel.id, channel.topic);
-                }
-                Record::Message { header, data } => {
-                    if let Some(topic) = topics.get(&header.channel_id) {
-                        give(topic, header.log_time, &data);
-                    }
-                }
-                _ => {}
-            }
+/// Passes on the messages up to the end of the data, or to its damaged part.
+fn each_message(path: &Path, mut give: impl FnMut(Message<'_>)) -> Result<(), LogError> {
+    for message in Messages::open(path)? {
+        match message {
+            Ok(message) => give(message),
+            Err(LogError::Damaged { .. }) => break,
+            Err(error) => return Err(error),
         }
     }
     Ok(())
 }
 
-fn add(moment: &mut Moment, topic: &str, data: &[u8]) {
+fn add(moments: &mut BTreeMap<u64, Moment>, times: &BTreeSet<u64>, (topic, time, data): (&str, u64, &[u8])) {
+    if topic == topic::EPISODE || !times.contains(&time) {
+        return;
+    }
+    let moment = moments.entry(time).or_default();
     match topic {
         topic::CAMERA => moment.frame = png(data),
         topic::SCENE => moment.shapes = shapes(data),
@@ -267,74 +183,14 @@ fn add(moment: &mut Moment, topic: &str, data: &[u8]) {
     }
 }
 
-/// The part of `foxglove.SceneUpdate` that a map needs.
-#[derive(Clone, PartialEq, prost::Message)]
-struct SceneUpdate {
-    #[prost(message, repeated, tag = "2")]
-    entities: Vec<Entity>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-struct Entity {
-    #[prost(string, tag = "3")]
-    id: String,
-    #[prost(message, repeated, tag = "8")]
-    cubes: Vec<SolidMessage>,
-    #[prost(message, repeated, tag = "9")]
-    spheres: Vec<SolidMessage>,
-    #[prost(message, repeated, tag = "10")]
-    cylinders: Vec<Cylinder>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-struct SolidMessage {
-    #[prost(message, optional, tag = "1")]
-    pose: Option<Pose>,
-    #[prost(message, optional, tag = "2")]
-    size: Option<Numbers>,
-    #[prost(message, optional, tag = "3")]
-    color: Option<Numbers>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-struct Cylinder {
-    #[prost(message, optional, tag = "1")]
-    pose: Option<Pose>,
-    #[prost(message, optional, tag = "2")]
-    size: Option<Numbers>,
-    #[prost(message, optional, tag = "5")]
-    color: Option<Numbers>,
-}
-
-#[derive(Clone, PartialEq, prost::Message)]
-struct Pose {
-    #[prost(message, optional, tag = "1")]
-    position: Option<Numbers>,
-    #[prost(message, optional, tag = "2")]
-    orientation: Option<Numbers>,
-}
-
-/// `foxglove.Vector3`, a unit quaternion or a colour, which are alike: up to four numbers.
-#[derive(Clone, Copy, PartialEq, prost::Message)]
-struct Numbers {
-    #[prost(double, tag = "1")]
-    x: f64,
-    #[prost(double, tag = "2")]
-    y: f64,
-    #[prost(double, tag = "3")]
-    z: f64,
-    #[prost(double, tag = "4")]
-    w: f64,
-}
-
 fn shapes(data: &[u8]) -> Vec<SceneShape> {
-    let Ok(update) = <SceneUpdate as prost::Message>::decode(data) else { return Vec::new() };
+    let Ok(update) = SceneUpdate::decode(data) else { return Vec::new() };
     let mut shapes: Vec<SceneShape> = update.entities.iter().flat_map(of_entity).collect();
     shapes.sort_by(|a, b| a.height.total_cmp(&b.height));
     shapes
 }
 
-fn of_entity(entity: &Entity) -> Vec<SceneShape> {
+fn of_entity(entity: &SceneEntity) -> Vec<SceneShape> {
     let name = &entity.id;
     let cubes = entity.cubes.iter().filter_map(|cube| boxed(name, cube.pose.as_ref()?, cube.size?, cube.color?));
     let spheres = entity.spheres.iter().filter_map(|ball| round(name, ball.pose.as_ref()?, ball.size?, ball.color?));
@@ -342,7 +198,7 @@ fn of_entity(entity: &Entity) -> Vec<SceneShape> {
     cubes.chain(spheres).chain(posts).collect()
 }
 
-fn boxed(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<SceneShape> {
+fn boxed(name: &str, pose: &Pose, size: Vector3, color: Color) -> Option<SceneShape> {
     let (at, turn) = (pose.position?, pose.orientation?);
     let corner = |x: f64, y: f64, z: f64| {
         let [dx, dy, _] = turned(turn, [x * size.x / 2.0, y * size.y / 2.0, z * size.z / 2.0]);
@@ -353,17 +209,17 @@ fn boxed(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<Scene
     Some(SceneShape { name: name.to_owned(), outline, radius: None, rgba: rgba(color), height: at.z })
 }
 
-fn round(name: &str, pose: &Pose, size: Numbers, color: Numbers) -> Option<SceneShape> {
+fn round(name: &str, pose: &Pose, size: Vector3, color: Color) -> Option<SceneShape> {
     let at = pose.position?;
     let radius = Some(size.x / 2.0);
     Some(SceneShape { name: name.to_owned(), outline: vec![[at.x, at.y]], radius, rgba: rgba(color), height: at.z })
 }
 
-fn rgba(color: Numbers) -> [f64; 4] {
-    [color.x, color.y, color.z, color.w]
+fn rgba(color: Color) -> [f64; 4] {
+    [color.r, color.g, color.b, color.a]
 }
 
-fn turned(turn: Numbers, vector: [f64; 3]) -> [f64; 3] {
+fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let axis = [turn.x, turn.y, turn.z];
@@ -403,20 +259,25 @@ pub fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 mod tests {
     use std::path::Path;
 
-    use super::{LogIndex, Numbers, hull, turned, unfinished};
+    use super::{LogIndex, Moment, Quaternion, hull, turned, unfinished};
     use crate::read::{Event, LogReader, png};
 
     #[test]
     fn the_index_finds_every_frame_of_a_full_scan() {
         let log = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/recorded/E1-guesser.mcap"));
         let index = LogIndex::open(log).unwrap().unwrap();
+        let step = |id: &str, time| {
+            let mut found: Vec<Moment> = Vec::new();
+            index.each_moment(id, &[time].into(), &mut |_, moment| found.push(moment)).unwrap();
+            found
+        };
         let mut id = String::new();
         let mut frames = 0;
         for message in LogReader::open(log).unwrap().map(Result::unwrap) {
             match message.event {
                 Event::Episode(crate::message::EpisodeMessage::Begin(head)) => id = head.episode_id,
                 Event::Frame(image) => {
-                    let found = index.step(&id, message.time).unwrap().unwrap();
+                    let [found] = step(&id, message.time).try_into().unwrap();
                     assert_eq!(found.frame, png(&image));
                     assert!(found.shapes.iter().any(|shape| shape.name.starts_with("cube")));
                     frames += 1;
@@ -425,7 +286,7 @@ mod tests {
             }
         }
         assert!(frames > 0);
-        assert_eq!(index.step("E1/nobody/s1/r1", 0).unwrap(), None);
+        assert_eq!(step("E1/nobody/s1/r1", 0), []);
     }
 
     #[test]
@@ -463,7 +324,7 @@ mod tests {
     #[test]
     fn a_quarter_turn_and_a_hull() {
         let half = std::f64::consts::FRAC_1_SQRT_2;
-        let [x, y, _] = turned(Numbers { x: 0.0, y: 0.0, z: half, w: half }, [1.0, 0.0, 0.0]);
+        let [x, y, _] = turned(Quaternion { x: 0.0, y: 0.0, z: half, w: half }, [1.0, 0.0, 0.0]);
         assert!(x.abs() < 1e-9 && (y - 1.0).abs() < 1e-9);
         let square = vec![[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
         assert_eq!(hull(square), [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);

@@ -93,14 +93,10 @@ pub(super) fn event(name: &str, data: &[u8]) -> serde_json::Result<Event> {
 }
 
 /// The PNG in a `foxglove.CompressedImage`; `None` without one.
+#[cfg(any(feature = "sim", feature = "view"))]
 pub fn png(image: &[u8]) -> Option<Vec<u8>> {
-    #[derive(Clone, PartialEq, prost::Message)]
-    struct Image {
-        #[prost(bytes = "vec", tag = "2")]
-        data: Vec<u8>,
-    }
-    let image = <Image as prost::Message>::decode(image).ok()?;
-    (!image.data.is_empty()).then_some(image.data)
+    let image = <foxglove::messages::CompressedImage as foxglove::Decode>::decode(image).ok()?;
+    (!image.data.is_empty()).then(|| image.data.into())
 }
 
 /// The messages of a log up to its end record.

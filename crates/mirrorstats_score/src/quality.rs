@@ -14,11 +14,11 @@ use serde::Serialize;
 
 use super::tables::builder::episode_ids;
 use super::tables::table::CONDITION;
-pub use mirrorstats_trace::episodes::replies::statuses;
-use mirrorstats_trace::episodes::replies::{REPLY_STATUS, ReplyCounts};
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::EpisodeBatch;
 use mirrorstats_trace::schema::{self, Column, Kind};
+pub use mirrorstats_trace::validate::replies::statuses;
+use mirrorstats_trace::validate::replies::{REPLY_STATUS, ReplyCounts};
 
 const READ: [&str; 7] =
     [REPLY_STATUS, "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];

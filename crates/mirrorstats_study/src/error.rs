@@ -26,7 +26,7 @@ use mirrorstats_score::format::FormatError;
 use mirrorstats_score::tables::declared_experiments::DeclarationError;
 use mirrorstats_score::tables::select::SelectError;
 use mirrorstats_toml_spec::Faults;
-use mirrorstats_trace::episodes::lost::LostListError;
+use mirrorstats_trace::beside::lost::LostListError;
 use mirrorstats_trace::error::TraceError;
 
 /// An error of a study. Each message gives the problem, the location, the expected and found values, and a remedy.

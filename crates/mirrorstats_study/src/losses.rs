@@ -16,7 +16,7 @@ use mirrorstats_score::quality::{CellKey, QualityByCell};
 use mirrorstats_score::tables::builder::TableBuilder;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, LOST, LabelColumn, UNUSABLE_REPLIES};
-use mirrorstats_trace::episodes::lost::{self, LostEpisode};
+use mirrorstats_trace::beside::lost::{self, LostEpisode};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::{self, Column};
 

@@ -2,7 +2,9 @@
 //!
 //! The codes are stable: programs may depend on them. A message always says enough to find the row.
 
+use std::collections::HashMap;
 use std::fmt;
+use std::sync::LazyLock;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -53,7 +55,7 @@ pub enum Severity {
 }
 
 macro_rules! codes {
-    ($(#[$doc:meta] $code:ident, $severity:ident, $name:literal: $rule:literal, $help:literal;)+) => {
+    ($(#[$doc:meta] $code:ident: $name:literal,)+) => {
         /// A rule of the schema; the name in kebab case is stable.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "kebab-case")]
@@ -61,155 +63,117 @@ macro_rules! codes {
             $(#[$doc] $code,)+
         }
 
-        impl Code {
-            /// All codes, in the order of the documentation.
-            pub const ALL: [Self; [$(Self::$code,)+].len()] = [$(Self::$code,)+];
-
-            const fn entry(self) -> (Severity, &'static str, &'static str, &'static str) {
-                match self {
-                    $(Self::$code => (Severity::$severity, $name, $rule, $help),)+
-                }
-            }
-        }
+        mirrorstats_exact::names!(Code { $($code: $name,)+ });
     };
 }
 
 codes! {
     /// The file cannot be opened or read.
-    Unreadable, Error, "unreadable": "the file can be opened and read", "check the path and its permissions";
+    Unreadable: "unreadable",
     /// The file has no bytes.
-    EmptyFile, Error, "empty-file":
-        "the file has bytes", "the recording was interrupted or the copy failed: copy it again, or leave the file out";
+    EmptyFile: "empty-file",
     /// The file is not Parquet.
-    NotParquet, Error, "not-parquet": "the file is Parquet", "give the Parquet traces themselves";
+    NotParquet: "not-parquet",
     /// The file starts as Parquet and ends before its footer.
-    Truncated, Error, "truncated":
-        "the file ends with its footer", "the copy or the recording was cut short: copy it again";
+    Truncated: "truncated",
     /// The footer is there and makes no sense.
-    CorruptFooter, Error, "corrupt-footer":
-        "the footer describes the file", "the file is damaged: restore it from its source";
+    CorruptFooter: "corrupt-footer",
     /// The footer is good and the data behind it is not.
-    CorruptData, Error, "corrupt-data":
-        "the data decodes to what the footer says, and `episode_hash` is that of the rows",
-        "the file is damaged: restore it from its source";
+    CorruptData: "corrupt-data",
     /// Reading the file would take more work than files of its size do.
-    OverBudget, Error, "over-budget":
-        "what comes out of the file is in proportion to its size, its names are short, and its episodes fit into memory",
-        "if you trust the file, the environment variable MIRRORSTATS_BUDGET=10 allows ten times as much of everything";
+    OverBudget: "over-budget",
     /// The footer's metadata of mirrorstats cannot be read.
-    InvalidMetadata, Error, "invalid-metadata":
-        "`mirrorstats.schema_version` is the version of this program's schema; `mirrorstats.checksums` has one of each column chunk; in `mirrorstats.recording` a `palette` lists colours, and an \
-         `experiment` is spelled as in a definition file, in all files alike",
-        "correct or remove that key in the footer; a file without a schema version is read as that of another writer";
+    InvalidMetadata: "invalid-metadata",
     /// The file was written under a newer schema.
-    NewerSchema, Error, "newer-schema":
-        "the schema version is one that this program knows", "update mirrorstats to read this file";
+    NewerSchema: "newer-schema",
     /// A required column is not there.
-    MissingColumn, Error, "missing-column":
-        "every required column is there",
-        "`mirrorstats trace schema` lists the columns: add this one, or rename the one that holds it";
+    MissingColumn: "missing-column",
     /// Two columns have the same name.
-    RepeatedColumn, Error, "repeated-column": "every column has its own name", "drop or rename all but one of them";
+    RepeatedColumn: "repeated-column",
     /// A column of the schema has another type.
-    WrongType, Error, "wrong-type":
-        "a column of the schema has its logical type, in any width or encoding",
-        "cast the column where the file is written";
+    WrongType: "wrong-type",
     /// The file has no row.
-    NoEpisodes, Error, "no-episodes": "the file has at least one episode", "leave the file out, or record it again";
+    NoEpisodes: "no-episodes",
     /// A column that is never null has a null.
-    NullInRequired, Error, "null-in-required":
-        "a column that is never null has a value in every row", "give the row its value; nothing is filled in";
+    NullInRequired: "null-in-required",
     /// A name is the empty string.
-    EmptyString, Error, "empty-string": "a required name is not empty", "give the name, or null where allowed";
+    EmptyString: "empty-string",
     /// An integer does not fit the column's type.
-    OutOfRange, Error, "out-of-range": "an integer fits the schema's type", "correct the number, or use smaller ones";
+    OutOfRange: "out-of-range",
     /// A number of pixels, tokens, ... is below zero.
-    NegativeCount, Error, "negative-count":
-        "what is counted (px, mm, ms, tokens, USD, agents) is not below zero", "use null where the count is not known";
+    NegativeCount: "negative-count",
     /// An episode's first t is not 1.
-    TStart, Error, "t-start": "an episode's first t is 1", "number the steps from 1; t = 0 is not a step";
+    TStart: "t-start",
     /// An episode's t leaves numbers out.
-    TGap, Error, "t-gap": "t goes up by 1 from row to row", "add the missing steps, or record it again";
+    TGap: "t-gap",
     /// An episode has the same t twice in a row.
-    TDuplicate, Error, "t-duplicate": "every t of an episode has one row", "keep one row for each t";
+    TDuplicate: "t-duplicate",
     /// An episode's t goes backward.
-    TOrder, Error, "t-order": "t never goes back in an episode", "sort the rows by episode_id and t";
+    TOrder: "t-order",
     /// A value that names the episode or its setting changes within it.
-    InconsistentConstant, Error, "inconsistent-constant":
-        "a column that belongs to the episode is the same in all its rows",
-        "correct the rows, or give the episodes ids of their own";
+    InconsistentConstant: "inconsistent-constant",
     /// The rows of an episode are not together, or two episodes of a file share an id.
-    EpisodeTwice, Error, "episode-twice":
-        "an episode is in a file once, its rows together",
-        "remove the second one or give it another id; rows of one episode that lie apart belong together";
+    EpisodeTwice: "episode-twice",
     /// Two files have an episode of the same id.
-    EpisodeInTwoFiles, Error, "episode-in-two-files":
-        "an episode is in one of the files only", "leave one of the files out, or give the second episode another id";
+    EpisodeInTwoFiles: "episode-in-two-files",
     /// The experiment is none that the definitions know.
-    UnknownExperiment, Error, "unknown-experiment":
-        "the definitions know the experiment, or a footer declares it",
-        "add it to the definition file as `[experiment.NAME]`, say `open = true` there, or declare it in the footer";
+    UnknownExperiment: "unknown-experiment",
     /// The action is none of the five.
-    UnknownAction, Error, "unknown-action":
-        "an action is one of the five, or null", "use one of the names; null where the reply gave none";
+    UnknownAction: "unknown-action",
     /// The reply status is none of the schema's.
-    UnknownReplyStatus, Error, "unknown-reply-status":
-        "a reply status is one of the schema's", "use one of the names, or null";
+    UnknownReplyStatus: "unknown-reply-status",
     /// A text is none of those that the definitions declare.
-    UnknownValue, Error, "unknown-value":
-        "a text is one of the `values` that the definitions declare of its column",
-        "use one of the values, or add it to `values` in the definition file";
+    UnknownValue: "unknown-value",
     /// A colour is not spelled as colours are, or none of the palette.
-    InvalidColor, Error, "invalid-color":
-        "a colour is a lower-case name, of the palette in the footer where there is one, and has one spelling",
-        "write the colour as the palette or the other rows do";
+    InvalidColor: "invalid-color",
     /// A claimed colour is no body's and no cube's in all inputs.
-    UnseenColor, Note, "unseen-color":
-        "a claimed colour is that of a body or of a selected cube in the inputs",
-        "nothing to do where the agent said so: the claim counts as a wrong one";
+    UnseenColor: "unseen-color",
     /// The checksums in the footer are those of the file that this one was made from.
-    StaleChecksums, Note, "stale-checksums":
-        "checksums are those of the file",
-        "nothing to do where another program wrote the file again: its bytes are not checked";
+    StaleChecksums: "stale-checksums",
     /// A title, an order or a level of an experiment is another in the definitions than in the footer.
-    ExperimentOverridden, Note, "experiment-overridden":
-        "the footer and the definitions say the same of an experiment",
-        "nothing to do where that is meant: the definitions count";
+    ExperimentOverridden: "experiment-overridden",
     /// A level of an experiment in the footer is one of no metric of the definitions.
-    UnknownLevel, Note, "unknown-level":
-        "a level of an experiment in the footer is one of a metric of the definitions",
-        "nothing to do where other definitions have the metric: the level is passed over";
+    UnknownLevel: "unknown-level",
     /// An episode's rows are in more than one row group.
-    SplitEpisode, Note, "split-episode":
-        "an episode's rows are in one row group",
-        "nothing to do: the episode is read whole; mirrorstats' own writer keeps it together";
+    SplitEpisode: "split-episode",
     /// Replies of the file gave no decision.
-    UnreadableReplies, Note, "unreadable-replies":
-        "every reply could be read: its status is `ok` or `repaired`",
-        "the column `reply` holds what was replied; to the metrics these are steps without a decision";
+    UnreadableReplies: "unreadable-replies",
     /// All rows of an episode are those of another one, the id aside.
-    CopiedEpisode, Note, "copied-episode":
-        "no episode has all rows of another one under another id",
-        "leave the copy out: statistics count it as an independent episode";
+    CopiedEpisode: "copied-episode",
 }
 
+/// The text of a code in `assets/trace/rules.toml`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CodeText {
+    #[serde(default)]
+    note: bool,
+    rule: String,
+    help: String,
+}
+
+static CODES: LazyLock<HashMap<Code, CodeText>> = LazyLock::new(|| {
+    let text = include_str!("../../../assets/trace/rules.toml");
+    toml::from_str(text).expect("the built-in rules are well-formed: a test reads them")
+});
+
 impl Code {
-    pub const fn severity(self) -> Severity {
-        self.entry().0
+    fn text(self) -> &'static CodeText {
+        CODES.get(&self).expect("the built-in rules have every code: a test reads them")
     }
 
-    pub const fn name(self) -> &'static str {
-        self.entry().1
+    pub fn severity(self) -> Severity {
+        if self.text().note { Severity::Note } else { Severity::Error }
     }
 
     /// The rule in one line, as `mirrorstats trace schema` prints it.
-    pub const fn explain(self) -> &'static str {
-        self.entry().2
+    pub fn explain(self) -> &'static str {
+        &self.text().rule
     }
 
     /// The remedy, unless the location of the finding has better advice.
-    pub const fn help(self) -> &'static str {
-        self.entry().3
+    pub fn help(self) -> &'static str {
+        &self.text().help
     }
 }
 
@@ -309,6 +273,7 @@ mod tests {
     fn names_are_unique_and_what_serde_writes() {
         for (i, code) in Code::ALL.iter().enumerate() {
             assert_eq!(serde_json::to_string(code).unwrap(), format!("\"{}\"", code.name()));
+            assert!(!code.explain().is_empty() && !code.help().is_empty(), "{code}");
             assert!(Code::ALL[..i].iter().all(|before| before.name() != code.name()), "{code} twice");
         }
     }

@@ -3,8 +3,8 @@ use std::path::Path;
 
 use arrow::error::ArrowError;
 
+use super::beside::label_line::LabelsError;
 use super::diagnostic::Finding;
-use super::episodes::labels::LabelsError;
 
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::num::NonZeroUsize;
-use std::sync::{Mutex, PoisonError};
 
 use arrow::array::{ArrayRef, AsArray as _, DictionaryArray};
 use arrow::datatypes::{Int32Type, Int64Type};
@@ -11,14 +10,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::diagnostic::Finding;
-use super::episodes::replies::{REPLY_STATUS, ReplyCounts};
 use super::error::TraceError;
+use super::footers::renderer::{self, Renderer};
 use super::read::budget::most_listed;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
-use super::renderer::{self, Renderer};
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
+use super::validate::replies::{REPLY_STATUS, ReplyCounts};
 use mirrorstats_exact::budget::{Exceeded, Limit};
 use mirrorstats_exact::hash;
 use mirrorstats_parquet_pages::checksums::Checksums;
@@ -179,23 +178,18 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
             Ok(())
         },
     )?;
-    let (mut files, mut grid) = (Vec::with_capacity(set.files().len()), Grid::default());
-    let counts = std::mem::take(&mut tally.files);
-    let tally = Mutex::new(tally);
-    // Sorting the grid takes as long as hashing the files, so both run at once.
-    let jobs: Vec<_> = std::iter::once(None).chain(set.files().iter().zip(counts).map(Some)).collect();
-    let work = |job: &Option<(&TraceFile, u64)>| match job {
-        None => Ok(Done::Grid(std::mem::take(&mut *tally.lock().unwrap_or_else(PoisonError::into_inner)).grid())),
-        Some((file, episodes)) => about(file, *episodes).map(Done::File),
-    };
-    in_order(threads, &jobs, work, |done| {
-        match done? {
-            Done::Grid(found) => grid = found,
-            Done::File(about) => files.push(about),
-        }
-        Ok::<_, TraceError>(())
-    })?;
-    let Grid { cells, pairs } = grid;
+    let mut files = Vec::with_capacity(set.files().len());
+    let jobs: Vec<_> = set.files().iter().zip(std::mem::take(&mut tally.files)).collect();
+    in_order(
+        threads,
+        &jobs,
+        |(file, episodes)| about(file, *episodes),
+        |about| {
+            files.push(about?);
+            Ok::<_, TraceError>(())
+        },
+    )?;
+    let (cells, pairs) = tally.grid();
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
     let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
@@ -218,11 +212,6 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
 
 fn over_budget(set: &TraceSet, exceeded: &Exceeded) -> TraceError {
     Finding::over_budget(set.files().first().map_or("", TraceFile::name), exceeded).into()
-}
-
-enum Done {
-    Grid(Grid),
-    File(FileInfo),
 }
 
 fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
@@ -303,12 +292,6 @@ struct EpisodeTally {
 /// The number of episodes per seed and run, ascending, for each experiment and model.
 type Cells = BTreeMap<(String, String), Vec<(SeedRun, u64)>>;
 
-#[derive(Default)]
-struct Grid {
-    cells: Cells,
-    pairs: Vec<SeedRun>,
-}
-
 impl EpisodeTally {
     fn add(&mut self, Keys { file, cells, episodes }: Keys) {
         self.files[file] += episodes.len() as u64;
@@ -327,7 +310,8 @@ impl EpisodeTally {
         })
     }
 
-    fn grid(self) -> Grid {
+    /// The episodes of each cell, and all seeds and runs.
+    fn grid(self) -> (Cells, Vec<SeedRun>) {
         let Self { places, mut episodes, .. } = self;
         let mut counted = |place: usize| {
             let mut pairs = std::mem::take(&mut episodes[place]);
@@ -337,7 +321,7 @@ impl EpisodeTally {
         };
         let cells: Cells = places.into_iter().map(|(cell, place)| (cell, counted(place))).collect();
         let pairs = distinct(cells.values().flatten().map(|(pair, _)| *pair));
-        Grid { cells, pairs }
+        (cells, pairs)
     }
 }
 

@@ -6,8 +6,9 @@
 //! | `read` | from bytes to complete episodes: footers, pages, columns, one pass on several threads |
 //! | `write` | from episodes to bytes: new traces, merged traces, sealed copies |
 //! | `validate` | the rules for complete episodes, alone and together |
-//! | `footers` | the declarations of files: clusters, experiments, answering models, checksums |
-//! | `episodes` | one episode: steps, hash, pictures, colours, losses, replies, attributions, names of models |
+//! | `footers` | the declarations of files: clusters, experiments, models, renderers, checksums |
+//! | `beside` | lists beside the traces: labels of coders, lost episodes |
+//! | `episodes` | one episode: steps, hash, frames, colours, answers, attributions |
 //!
 //! ```
 //! use mirrorstats_trace::inputs::Input;
@@ -24,6 +25,7 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod beside;
 pub mod catch_panic;
 pub mod copies;
 pub mod diagnostic;
@@ -34,7 +36,6 @@ mod glob_paths;
 pub mod info;
 pub mod inputs;
 pub mod read;
-pub mod renderer;
 pub mod scan;
 pub mod schema;
 pub mod validate;

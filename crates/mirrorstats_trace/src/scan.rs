@@ -167,15 +167,11 @@ impl TraceSet {
             }
         });
         // A repeated id is found only at the end, though it precedes the event that ended the pass.
-        if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
-            return Err(TraceError::from(finding).into());
-        }
+        prints.check(self.files(), &layout)?;
         passed?;
         // Two spellings of one colour are found only when all names are known.
-        match spellings.first_conflict(self.files(), &layout, threads)? {
-            Some(finding) => Err(TraceError::from(finding).into()),
-            None => Ok(summary),
-        }
+        spellings.check(self.files(), &layout, threads)?;
+        Ok(summary)
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_log::LogError;
 use mirrorstats_study::StudyError;
-use mirrorstats_trace::episodes::labels::LabelsError;
+use mirrorstats_trace::beside::label_line::LabelsError;
 use mirrorstats_trace::error::TraceError;
 
 /// A folder of copies, and the folder of their originals.

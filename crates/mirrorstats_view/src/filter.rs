@@ -9,7 +9,7 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_report::cells::group::CONDITION;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_study::Results;
-use mirrorstats_trace::episodes::labels;
+use mirrorstats_trace::beside::labels;
 
 /// The keys and values of a request, in order.
 pub(super) type Query = [(String, String)];

@@ -12,8 +12,8 @@ use super::error::{Renamed, ViewError};
 use mirrorstats_exact::replace::{FolderError, folder_of};
 use mirrorstats_log::frames;
 use mirrorstats_study::resolve;
-use mirrorstats_trace::episodes::labels::list_beside;
-use mirrorstats_trace::episodes::lost::list_of;
+use mirrorstats_trace::beside::labels::list_beside;
+use mirrorstats_trace::beside::lost::list_of;
 use mirrorstats_trace::inputs::Input;
 
 /// The folder for a recording's finished episodes that are not in the trace yet, and for the one being written.

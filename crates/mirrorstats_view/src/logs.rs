@@ -1,6 +1,5 @@
 //! The logs of recordings: what they have of an episode's steps.
 
-use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -38,9 +37,6 @@ impl Opened {
     }
 }
 
-/// Passes what an index has of an episode at some times.
-type Read<T> = fn(&LogIndex, &str, &BTreeSet<u64>, &mut dyn FnMut(u64, T)) -> Result<(), LogError>;
-
 /// Finished logs, and the recently used indices of them.
 #[derive(Debug)]
 pub(super) struct Logs {
@@ -56,52 +52,39 @@ impl Logs {
 
     /// The log's record of a step.
     pub fn moment(&self, opened: &Opened, t: usize) -> Result<Option<Moment>, LogError> {
-        let Some(time) = opened.time_of(t) else { return Ok(None) };
-        if let Some(log) = &opened.running {
-            return frames::unfinished_step(log, time);
-        }
-        for log in self.of(opened) {
-            let Some(index) = self.index(log)? else { continue };
-            if let Some(moment) = index.step(&opened.episode.episode_id, time)? {
-                return Ok(Some(moment));
-            }
-        }
-        Ok(None)
+        let mut found = None;
+        let time = opened.time_of(t).into_iter().collect();
+        self.moments(opened, &time, &mut |_, moment| {
+            found.get_or_insert(moment);
+        })?;
+        Ok(found)
     }
 
     /// Passes the shapes of each step with its t; no calls without a log. Only one log at a time is read for shapes.
     pub fn each_shapes(&self, opened: &Opened, give: &mut dyn FnMut(usize, Vec<SceneShape>)) -> Result<(), LogError> {
         let _one = self.reading.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(log) = &opened.running {
-            let times = opened.times();
-            return frames::each_unfinished_shapes(log, &mut |time, shapes| {
-                if let Some(t) = times.get(&time) {
-                    give(*t, shapes);
-                }
-            });
-        }
-        self.each(opened, LogIndex::each_shapes, give)
+        self.each_moment(opened, &mut |t, moment| give(t, moment.shapes))
     }
 
-    /// Passes the log's record of each step of a finished episode, reading the log once.
+    /// Passes the log's record of each step with its t, reading the log once.
     pub fn each_moment(&self, opened: &Opened, give: &mut dyn FnMut(usize, Moment)) -> Result<(), LogError> {
-        self.each(opened, LogIndex::each_moment, give)
+        let times = opened.times();
+        self.moments(opened, &times.keys().copied().collect(), &mut |time, moment| give(times[&time], moment))
     }
 
-    /// Reads the first log that has steps of the episode.
-    fn each<T>(&self, opened: &Opened, read: Read<T>, give: &mut dyn FnMut(usize, T)) -> Result<(), LogError> {
-        let times = opened.times();
-        let wanted: BTreeSet<u64> = times.keys().copied().collect();
-        let is_found = Cell::new(false);
+    /// Reads the log of an episode under way, or the first log that has steps of the episode.
+    fn moments(
+        &self,
+        opened: &Opened,
+        times: &BTreeSet<u64>,
+        give: &mut dyn FnMut(u64, Moment),
+    ) -> Result<(), LogError> {
+        if let Some(log) = &opened.running {
+            return frames::each_unfinished_moment(log, times, give);
+        }
         for log in self.of(opened) {
             let Some(index) = self.index(log)? else { continue };
-            read(&index, &opened.episode.episode_id, &wanted, &mut |time, found| {
-                is_found.set(true);
-                if let Some(t) = times.get(&time) {
-                    give(*t, found);
-                }
-            })?;
-            if is_found.get() {
+            if index.each_moment(&opened.episode.episode_id, times, give)? {
                 break;
             }
         }

@@ -329,7 +329,7 @@ fn opened(rows: &EpisodeRows, input: &Input, is_mirror: bool) -> Result<Opened, 
 fn unfinished(log: &Path) -> Result<Option<Episode>, LogError> {
     match frames::unfinished(log) {
         Err(LogError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
-        read => Ok(read?.map(|found| found.episode)),
+        read => read,
     }
 }
 

@@ -9,7 +9,7 @@ use tokio::runtime::Runtime;
 
 use crate::cli::{Failure, output};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_trace::episodes::model_id::OWN_SERVER;
+use mirrorstats_trace::footers::model_id::OWN_SERVER;
 use mirrorstats_world::agent::vlm::Vlm;
 use mirrorstats_world::agent::vlm::limits::{Account, Limits, Spend};
 use mirrorstats_world::agent::vlm::models::{Choice, Models, ModelsError};

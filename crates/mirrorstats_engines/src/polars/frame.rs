@@ -8,7 +8,7 @@ use polars::prelude::{
 };
 
 use super::run::{PolarsError, collect};
-use mirrorstats_trace::episodes::labels::Labels;
+use mirrorstats_trace::beside::labels::Labels;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::read::open::{TraceFile, TraceSet};
 use mirrorstats_trace::read::verify::verify_pages;

@@ -27,7 +27,7 @@ use mirrorstats_metric::catalogs::catalog::Catalog;
 use mirrorstats_parquet_pages::check_footer;
 use mirrorstats_parquet_pages::checksums::{self, CREATED_BY, Held};
 use mirrorstats_trace::catch_panic::contained;
-use mirrorstats_trace::read::flat::{FlatRows, TableFile};
+use mirrorstats_trace::read::flat::{TableFile, flat_rows};
 use mirrorstats_trace::schema::COLUMNS;
 
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -194,7 +194,7 @@ fn decode(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, F
     }
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let about = ArrowReaderMetadata::load(&input, options)?;
-    let rows = FlatRows::new(input, Arc::clone(about.metadata())).map_err(ParquetError::General)?;
+    let rows = flat_rows(input, Arc::clone(about.metadata())).map_err(ParquetError::General)?;
     let catalog = match (footer::value(about.metadata().file_metadata(), DEFINITIONS_KEY), partition.definitions) {
         (Some(text), _) => serde_json::from_str(&text).map_err(|error| FormatError::Definitions(error.to_string()))?,
         (None, Some(named)) => named.clone(),

@@ -18,7 +18,7 @@ use mirrorstats_metric::columns::{Column, Columns, Level, Type};
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_metric::file::FileError;
 use mirrorstats_toml_spec::Faults;
-use mirrorstats_trace::episodes::labels;
+use mirrorstats_trace::beside::labels;
 
 #[derive(Debug, thiserror::Error)]
 pub enum SelectError {

@@ -23,8 +23,8 @@ use mirrorstats_score::format::Format;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::footers::checksums::missing_note;
+use mirrorstats_trace::footers::{answered, renderer};
 use mirrorstats_trace::schema::SCHEMA_VERSION;
-use mirrorstats_trace::{footers::answered, renderer};
 
 pub(crate) const MOST_LISTED: usize = 20_000;
 
@@ -150,7 +150,7 @@ impl Study {
         notes.extend(self.source.traces().ok().and_then(|traces| missing_note(traces.files())));
         if let Source::Traces(set) = &self.source {
             notes.extend(answered::by_others(set.files()));
-            notes.extend(renderer::told(&renderer::of_files(set.files())));
+            notes.extend(renderer::note(&renderer::of_files(set.files())));
         }
         let total = lost.total();
         if total > 0 {

@@ -11,7 +11,7 @@ use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{CONDITION, EpisodeTable};
 use mirrorstats_score::vocabulary;
 use mirrorstats_statistics::design::{Cluster, Design, DesignKind};
-use mirrorstats_trace::episodes::labels;
+use mirrorstats_trace::beside::labels;
 use mirrorstats_trace::footers::declared::{self, Declared, Origin};
 
 use crate::losses::Counted;

@@ -11,7 +11,7 @@ use mirrorstats_engines::spark::source::is_uri;
 use mirrorstats_exact::hash;
 use mirrorstats_report::bundle;
 use mirrorstats_score::format::{self, Format};
-use mirrorstats_trace::episodes::labels::Labels;
+use mirrorstats_trace::beside::labels::Labels;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::inputs::{self, Input};
 use mirrorstats_trace::read::open::TraceSet;

@@ -11,8 +11,8 @@ use mirrorstats_report::figures::{FigureName, gaze};
 use mirrorstats_score::quality::QualityByCell;
 use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
 use mirrorstats_score::timeline::Timeline;
-use mirrorstats_trace::episodes::replies::REPLY_STATUS;
 use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::validate::replies::REPLY_STATUS;
 
 /// The requested results besides the episode table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

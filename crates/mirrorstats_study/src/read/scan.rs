@@ -16,11 +16,11 @@ use mirrorstats_score::score_traces::{self, Scored};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, LabelColumn};
 use mirrorstats_score::vocabulary;
 use mirrorstats_statistics::losses::INFRASTRUCTURE;
-use mirrorstats_trace::episodes::labels::PREFIX;
-use mirrorstats_trace::episodes::replies::REPLY_STATUS;
+use mirrorstats_trace::beside::labels::PREFIX;
 use mirrorstats_trace::footers::declared::Declared;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::schema::{self, Column, Domain};
+use mirrorstats_trace::validate::replies::REPLY_STATUS;
 
 impl Study {
     /// Reads the inputs once. A file that changed since it was opened is an error. Errors: faults of the traces or the
@@ -45,7 +45,7 @@ impl Study {
     /// of lost episodes that cannot be read.
     pub fn has_quality(&self) -> Result<bool, StudyError> {
         let reader = QualityReader::of(self.source.traces()?);
-        Ok(!reader.columns().is_empty() || !mirrorstats_trace::episodes::lost::beside(&self.inputs)?.is_empty())
+        Ok(!reader.columns().is_empty() || !mirrorstats_trace::beside::lost::beside(&self.inputs)?.is_empty())
     }
 
     /// The reply quality of all episodes, lost ones included. Errors: scores, which have no replies; faults of the

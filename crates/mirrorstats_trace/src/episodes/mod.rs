@@ -3,8 +3,4 @@ pub mod episode;
 pub mod episode_hash;
 pub mod frame;
 pub mod identification;
-pub mod labels;
-pub mod lost;
-pub mod model_id;
 pub mod palette;
-pub mod replies;

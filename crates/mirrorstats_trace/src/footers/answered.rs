@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::episodes::model_id::{OWN_SERVER, answers_for};
+use crate::footers::model_id::{OWN_SERVER, answers_for};
 use crate::read::open::TraceFile;
 use mirrorstats_exact::escape::visible;
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::episodes::lost::LostEpisode;
+use crate::beside::lost::LostEpisode;
 use crate::read::open::TraceSet;
 use mirrorstats_exact::names;
 

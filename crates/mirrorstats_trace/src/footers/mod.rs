@@ -2,6 +2,8 @@ pub mod answered;
 pub mod checksums;
 pub mod declared;
 pub mod declared_experiment;
+pub mod model_id;
+pub mod renderer;
 
 use serde_json::Value;
 

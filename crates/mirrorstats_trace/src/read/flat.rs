@@ -23,9 +23,6 @@ const BATCH_ROWS: usize = 1024;
 /// An open file that may be a table.
 pub type TableFile = File;
 
-/// Rows of a file without nested columns.
-pub struct FlatRows(CheckedRows);
-
 /// Rows from the library's reader. A panic or an error of the library is a finding of the file.
 pub struct CheckedRows {
     file: String,
@@ -61,16 +58,17 @@ impl Iterator for CheckedRows {
     }
 }
 
-impl FlatRows {
-    pub fn new(file: TableFile, metadata: Arc<ParquetMetaData>) -> Result<Self, String> {
-        let columns = metadata.file_metadata().schema_descr().columns();
-        if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
-            return Err(words(&is_nested("", &nested.path().parts()[0])));
-        }
-        // The caller has verified all checksums of such a file before.
-        let rows = table_rows("", file, metadata, ChunkChecksums::default(), None);
-        rows.map(Self).map_err(|finding| words(&finding))
+/// The rows of a file without nested columns, whose checksums the caller has verified.
+pub fn flat_rows(
+    file: TableFile,
+    metadata: Arc<ParquetMetaData>,
+) -> Result<impl Iterator<Item = Result<RecordBatch, String>>, String> {
+    let columns = metadata.file_metadata().schema_descr().columns();
+    if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
+        return Err(words(&is_nested("", &nested.path().parts()[0])));
     }
+    let rows = table_rows("", file, metadata, ChunkChecksums::default(), None).map_err(|finding| words(&finding))?;
+    Ok(rows.map(|batch| batch.map_err(|finding| words(&finding))))
 }
 
 /// The rows of these columns of a file, by their positions; of all columns if `None`.
@@ -115,14 +113,6 @@ fn keyed(part: &FieldRef) -> FieldRef {
     match part.data_type() {
         DataType::Utf8 => Arc::new(part.as_ref().clone().with_data_type(text_type())),
         _ => with_keys(part),
-    }
-}
-
-impl Iterator for FlatRows {
-    type Item = Result<RecordBatch, String>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.0.next().map(|batch| batch.map_err(|finding| words(&finding)))
     }
 }
 

@@ -7,7 +7,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Schema};
 
 pub use super::footer::trace_file::{FileColumn, TraceFile};
-use crate::episodes::labels::Labels;
+use crate::beside::labels::Labels;
 use crate::error::TraceError;
 use crate::inputs::Input;
 use crate::schema::{self, COLUMNS, Column, Domain, Kind};
@@ -15,7 +15,7 @@ use crate::schema::{self, COLUMNS, Column, Domain, Kind};
 /// Open traces: every footer is read and valid, no rows are read yet.
 #[derive(Debug)]
 pub struct TraceSet {
-    files: Vec<TraceFile>,
+    files: Arc<[TraceFile]>,
     /// The labels of coders beside the traces, one value per episode.
     labels: Labels,
     label_columns: Vec<String>,
@@ -73,11 +73,15 @@ impl TraceSet {
     }
 
     pub fn of(files: Vec<TraceFile>) -> Self {
-        Self { files, labels: Labels::default(), label_columns: Vec::new() }
+        Self { files: files.into(), labels: Labels::default(), label_columns: Vec::new() }
     }
 
     pub fn files(&self) -> &[TraceFile] {
         &self.files
+    }
+
+    pub(super) fn shared_files(&self) -> Arc<[TraceFile]> {
+        Arc::clone(&self.files)
     }
 
     /// The use of a column over all files; `None` if no file and no label has it.
@@ -87,7 +91,7 @@ impl TraceSet {
         }
         let mut seen: Option<(&TraceFile, Kind)> = None;
         let (mut present, mut missing_from, mut conflict) = (false, None, None);
-        for file in &self.files {
+        for file in self.files.iter() {
             match (file.column(name).map(|column| column.kind), seen) {
                 (None, _) => missing_from = missing_from.or_else(|| Some(file.name().to_owned())),
                 (Some(None), _) => present = true,

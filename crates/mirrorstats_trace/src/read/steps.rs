@@ -3,32 +3,22 @@
 
 use std::collections::{BTreeSet, VecDeque};
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 use std::vec;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch, RecordBatchOptions, new_null_array};
-use arrow::compute::{CastOptions, cast, cast_with_options, filter_record_batch};
-use arrow::datatypes::{DataType, Field, Fields, Schema, SchemaRef};
-use parquet::arrow::ProjectionMask;
+use arrow::array::{BooleanArray, RecordBatch, RecordBatchOptions};
+use arrow::compute::{CastOptions, cast_with_options, filter_record_batch};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 
-use super::flat::CheckedRows;
-use super::footer::folder_columns::FolderColumn;
+use super::decode::{RowGroup, Rows};
 use super::footer::trace_file::{Readable, TraceFile};
 use super::open::TraceSet;
 use super::projection::Layout;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::schema::{Kind, Stored};
-use mirrorstats_exact::input;
-use mirrorstats_parquet_pages::{Expansion, FaultSlot, Library, Store};
-
-const BATCH_ROWS: usize = 8 * 1024;
-/// With views, a batch holds no text, so that it can have more rows.
-const BATCH_ROWS_OF_VIEWS: usize = 64 * 1024;
-const EPISODE_ID: &str = "episode_id";
 
 /// The most batches that a thread decodes ahead of the reader.
 const AHEAD: usize = 4;
@@ -37,30 +27,26 @@ const AHEAD: usize = 4;
 ///
 /// An error ends the iteration. One thread per row group decodes ahead.
 pub struct Steps {
-    shape: StepSelection,
-    parts: vec::IntoIter<Part>,
-    /// Row groups that are being decoded: the name of the file, and the rows.
-    ahead: VecDeque<(String, Receiver<Rows>)>,
+    selection: StepSelection,
+    /// The row groups that are not started, with their files.
+    left: vec::IntoIter<(usize, usize)>,
+    /// The batches of the row groups that are being decoded, with their files.
+    ahead: VecDeque<(usize, Receiver<Batch>)>,
+    /// Held so that a file's footer is read once for all its row groups.
+    footer: Option<Arc<Readable>>,
     threads: NonZeroUsize,
 }
 
 #[derive(Clone)]
 struct StepSelection {
+    files: Arc<[TraceFile]>,
+    layout: Arc<Layout>,
     schema: SchemaRef,
     episodes: Option<Arc<BTreeSet<String>>>,
 }
 
-struct Part {
-    name: String,
-    path: PathBuf,
-    readable: Arc<Readable>,
-    expansion: Arc<Expansion>,
-    folders: Vec<FolderColumn>,
-    row_group: usize,
-}
-
-/// Rows, or `None` at the end of a row group.
-type Rows = Result<Option<RecordBatch>, TraceError>;
+/// A batch, or `None` at the end of a row group.
+type Batch = Result<Option<RecordBatch>, TraceError>;
 
 impl Steps {
     /// The steps of these episodes, with these columns in this order; all episodes or columns if absent.
@@ -75,39 +61,49 @@ impl Steps {
         };
         let all = || set.column_names().into_iter().filter(is_readable).map(str::to_owned).collect();
         let names: Vec<String> = columns.map_or_else(all, <[String]>::to_vec);
-        let layout = Layout::new(set, [], names.iter().map(String::as_str))?;
+        let layout = Layout::new(set, names.iter().map(String::as_str), [])?;
         let field = |name: &String| {
             let kind = layout.position(name).map_or(Kind::String, |at| layout.columns[at].kind);
             Field::new(name, data_type(set, name, kind), true)
         };
         let schema = Arc::new(Schema::new(names.iter().map(field).collect::<Vec<_>>()));
-        let files = set.files().iter().map(|file| Part::of_file(file).map_err(TraceError::from));
-        let parts: Vec<Vec<Part>> = files.collect::<Result<_, _>>()?;
-        let parts = parts.into_iter().flatten().collect::<Vec<_>>().into_iter();
-        let shape = StepSelection { schema, episodes: episodes.map(Arc::new) };
-        Ok(Self { shape, parts, ahead: VecDeque::new(), threads })
+        let files = set.shared_files();
+        let row_groups = files.iter().enumerate();
+        let row_groups = row_groups.flat_map(|(at, file)| (0..file.row_groups()).map(move |group| (at, group)));
+        let left = row_groups.collect::<Vec<_>>().into_iter();
+        let selection = StepSelection { files, layout: Arc::new(layout), schema, episodes: episodes.map(Arc::new) };
+        Ok(Self { selection, left, ahead: VecDeque::new(), footer: None, threads })
     }
 
-    /// The same steps with texts as `Utf8View`: equal texts of a page share their bytes.
+    /// The same steps with texts as `Utf8View`: equal texts of a batch share their bytes.
     #[must_use]
     pub fn with_views(mut self) -> Self {
-        self.shape.schema = Arc::new(Schema::new(with_views(self.shape.schema.fields())));
+        let viewed = |field: &Arc<Field>| match field.data_type() {
+            DataType::Utf8 => field.as_ref().clone().with_data_type(DataType::Utf8View),
+            _ => field.as_ref().clone(),
+        };
+        let fields: Vec<Field> = self.selection.schema.fields().iter().map(viewed).collect();
+        self.selection.schema = Arc::new(Schema::new(fields));
         self
     }
 
     /// The columns: those of the schema with its types, others as text, int64, float64 or bool; all may be null.
     pub fn schema(&self) -> SchemaRef {
-        Arc::clone(&self.shape.schema)
+        Arc::clone(&self.selection.schema)
     }
 
-    fn rows(&mut self) -> Rows {
+    fn batch(&mut self) -> Batch {
         loop {
             let free = self.threads.get().saturating_sub(self.ahead.len());
-            self.ahead.extend(self.parts.by_ref().take(free).map(|part| part.ahead(self.shape.clone())));
-            let Some((name, rows)) = self.ahead.front() else { return Ok(None) };
+            for (file, row_group) in self.left.by_ref().take(free) {
+                self.footer = self.selection.files[file].footer().ok();
+                self.ahead.push_back((file, self.selection.clone().start(file, row_group)));
+            }
+            let Some((file, batches)) = self.ahead.front() else { return Ok(None) };
+            let name = self.selection.files[*file].name();
             let expected = "a row group that can be read";
             let gone = || Box::new(Finding::new(Code::Unreadable, name, expected, "a thread that ended early"));
-            match rows.recv().map_err(|_| TraceError::from(gone()))?? {
+            match batches.recv().map_err(|_| TraceError::from(gone()))?? {
                 None => drop(self.ahead.pop_front()),
                 some => return Ok(some),
             }
@@ -116,28 +112,39 @@ impl Steps {
 }
 
 impl StepSelection {
-    fn complete(&self, rows: &RecordBatch, folders: &[FolderColumn]) -> Result<RecordBatch, TraceError> {
-        let column = |field: &Arc<Field>| -> Result<ArrayRef, arrow::error::ArrowError> {
-            let options = CastOptions { safe: false, ..CastOptions::default() };
-            match rows.column_by_name(field.name()) {
-                Some(values) => cast_with_options(values, field.data_type(), &options),
-                None => match folders.iter().find(|folder| folder.column.name == *field.name()) {
-                    Some(folder) => folder.repeated(field.data_type(), rows.num_rows()),
-                    None => Ok(new_null_array(field.data_type(), rows.num_rows())),
-                },
+    fn start(self, file: usize, row_group: usize) -> Receiver<Batch> {
+        let (sender, batches) = sync_channel(AHEAD);
+        thread::spawn(move || {
+            let end = self.send(file, row_group, &sender).map(|()| None);
+            // If this fails, the reader is gone.
+            let _ = sender.send(end);
+        });
+        batches
+    }
+
+    fn send(&self, file: usize, row_group: usize, sender: &SyncSender<Batch>) -> Result<(), TraceError> {
+        for rows in RowGroup::open(&self.files[file], &self.layout, row_group, None)? {
+            if sender.send(Ok(Some(self.batch(&rows?)?))).is_err() {
+                break;
             }
-        };
-        let columns = self.schema.fields().iter().map(column).collect::<Result<Vec<_>, _>>();
+        }
+        Ok(())
+    }
+
+    fn batch(&self, rows: &Rows) -> Result<RecordBatch, TraceError> {
+        let casts = CastOptions { safe: false, ..CastOptions::default() };
+        let fields = self.schema.fields().iter();
+        let found = fields.filter_map(|field| Some((field, &rows.columns[self.layout.position(field.name())?])));
+        let columns = found.map(|(field, column)| cast_with_options(&column.flat()?, field.data_type(), &casts));
         // Without columns, only this gives the number of rows.
-        let options = RecordBatchOptions::new().with_row_count(Some(rows.num_rows()));
-        let batch =
-            columns.and_then(|columns| RecordBatch::try_new_with_options(Arc::clone(&self.schema), columns, &options));
+        let options = RecordBatchOptions::new().with_row_count(Some(rows.len()));
+        let batch = columns
+            .collect::<Result<_, _>>()
+            .and_then(|columns| RecordBatch::try_new_with_options(Arc::clone(&self.schema), columns, &options));
         let batch = batch.map_err(TraceError::Memory)?;
-        let (Some(episodes), Some(ids)) = (&self.episodes, rows.column_by_name(EPISODE_ID)) else { return Ok(batch) };
-        let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
-        let ids = ids.as_string::<i32>();
-        let wanted: BooleanArray =
-            (0..ids.len()).map(|row| Some(ids.is_valid(row) && episodes.contains(ids.value(row)))).collect();
+        let Some(episodes) = &self.episodes else { return Ok(batch) };
+        let is_wanted = |row| Some(rows.episode(row).is_some_and(|id| episodes.contains(id)));
+        let wanted: BooleanArray = (0..rows.len()).map(is_wanted).collect();
         filter_record_batch(&batch, &wanted).map_err(TraceError::Memory)
     }
 }
@@ -146,12 +153,12 @@ impl Iterator for Steps {
     type Item = Result<RecordBatch, TraceError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let rows = self.rows();
-        if rows.is_err() {
+        let batch = self.batch();
+        if batch.is_err() {
             self.ahead.clear();
-            self.parts = Vec::new().into_iter();
+            self.left = Vec::new().into_iter();
         }
-        rows.transpose()
+        batch.transpose()
     }
 }
 
@@ -159,76 +166,4 @@ impl Iterator for Steps {
 fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
     let known = set.domain().column(name).filter(|column| column.stored.kind() == kind).map(|column| column.stored);
     known.map_or(kind.data_type(), Stored::data_type)
-}
-
-fn with_views(fields: &Fields) -> Fields {
-    let viewed = |field: &Arc<Field>| {
-        let held = if let DataType::Dictionary(_, values) = field.data_type() { values } else { field.data_type() };
-        match held {
-            DataType::Utf8 | DataType::LargeUtf8 => Arc::new(field.as_ref().clone().with_data_type(DataType::Utf8View)),
-            _ => Arc::clone(field),
-        }
-    };
-    fields.iter().map(viewed).collect()
-}
-
-impl Part {
-    fn of_file(file: &TraceFile) -> Result<Vec<Self>, Box<Finding>> {
-        let readable = file.footer()?;
-        let part = |row_group| Self {
-            name: file.name().to_owned(),
-            path: file.path().to_owned(),
-            readable: Arc::clone(&readable),
-            expansion: Arc::clone(&file.expansion),
-            folders: file.folders().to_vec(),
-            row_group,
-        };
-        Ok((0..readable.footer.metadata().num_row_groups()).map(part).collect())
-    }
-
-    fn ahead(self, shape: StepSelection) -> (String, Receiver<Rows>) {
-        let (sender, rows) = sync_channel(AHEAD);
-        let name = self.name.clone();
-        thread::spawn(move || {
-            let end = self.send(&shape, &sender).map(|()| None);
-            // If this fails, the reader is gone.
-            let _ = sender.send(end);
-        });
-        (name, rows)
-    }
-
-    fn send(self, shape: &StepSelection, sender: &SyncSender<Rows>) -> Result<(), TraceError> {
-        let folders = self.folders.clone();
-        for rows in self.reader(&shape.schema)? {
-            if sender.send(Ok(Some(shape.complete(&rows?, &folders)?))).is_err() {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn reader(self, schema: &Schema) -> Result<CheckedRows, Box<Finding>> {
-        let Self { name, path, readable, expansion, row_group, .. } = self;
-        let file = input::open(&path).map_err(|error| Finding::unreadable(&name, &error))?;
-        let store = Store::new(file, expansion);
-        let metadata = Arc::clone(readable.footer.metadata());
-        let described = metadata.file_metadata().schema_descr();
-        let wanted = described.columns().iter().enumerate().filter(|(_, column)| {
-            let path = column.path().parts();
-            path.len() == 1 && (path[0] == EPISODE_ID || schema.field_with_name(&path[0]).is_ok())
-        });
-        let has_views = schema.fields().iter().any(|field| *field.data_type() == DataType::Utf8View);
-        let fields = has_views.then(|| with_views(readable.footer.schema().fields()));
-        let batch = if has_views { BATCH_ROWS_OF_VIEWS } else { BATCH_ROWS };
-        let columns = ProjectionMask::leaves(described, wanted.map(|(at, _)| at).collect::<Vec<_>>());
-        let library = Library {
-            store,
-            metadata: Arc::clone(&metadata),
-            checksums: readable.chunks.clone(),
-            row_groups: vec![row_group],
-            slot: FaultSlot::default(),
-            writes_out: !has_views,
-        };
-        CheckedRows::open(&name, &library, columns, fields.as_ref(), batch, None)
-    }
 }

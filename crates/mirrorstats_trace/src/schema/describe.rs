@@ -1,9 +1,29 @@
 //! The schema as a document, printed by `mirrorstats trace schema` and stored in `schemas/trace.schema.json`.
 
-use serde::Serialize;
+use std::sync::LazyLock;
+
+use serde::{Deserialize, Serialize};
 
 use crate::diagnostic::{Code, Severity};
-use crate::schema::{COLUMNS, Column, METADATA, MetadataKey, SCHEMA_VERSION};
+use crate::schema::{COLUMNS, Column, SCHEMA_VERSION};
+
+/// A key of the footer.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MetadataKey {
+    pub key: String,
+    pub doc: String,
+}
+
+#[derive(Deserialize)]
+struct MetadataFile {
+    metadata: Vec<MetadataKey>,
+}
+
+static METADATA: LazyLock<MetadataFile> = LazyLock::new(|| {
+    let text = include_str!("../../../../assets/trace/metadata.toml");
+    toml::from_str(text).expect("the built-in keys are well-formed: a test reads them")
+});
 
 #[derive(Clone, Debug, Serialize)]
 pub struct SchemaDocument {
@@ -35,7 +55,7 @@ impl SchemaDocument {
                           Columns that are not listed are kept and can be used in definitions.",
             version: SCHEMA_VERSION,
             columns: &COLUMNS,
-            metadata: METADATA,
+            metadata: &METADATA.metadata,
             rules: Code::ALL.into_iter().map(rule).collect(),
         }
     }

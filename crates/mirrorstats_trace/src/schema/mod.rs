@@ -11,8 +11,6 @@ pub mod domain;
 mod field_access;
 pub mod rules;
 
-use serde::Serialize;
-
 pub use column::{Column, Kind, Stored};
 pub use domain::{COLUMNS, DeclaredColumn, Domain, column};
 pub use field_access::Value;
@@ -27,78 +25,10 @@ pub(crate) fn of_some_tasks() -> impl Iterator<Item = &'static str> {
     COLUMNS.iter().filter(|column| column.is_of_some_tasks).map(|column| column.name)
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct MetadataKey {
-    pub key: &'static str,
-    pub doc: &'static str,
-}
-
 pub const VERSION_KEY: &str = "mirrorstats.schema_version";
 pub(crate) const WRITER_KEY: &str = "mirrorstats.writer";
 pub const RECORDING_KEY: &str = "mirrorstats.recording";
 pub(crate) const CHECKSUMS_KEY: &str = mirrorstats_parquet_pages::checksums::KEY;
-
-pub const METADATA: &[MetadataKey] = &[
-    MetadataKey {
-        key: VERSION_KEY,
-        doc: "The version of this schema, a decimal integer. Another version is refused. A file without it is one of \
-              another writer, and its columns are checked all the same.",
-    },
-    MetadataKey { key: WRITER_KEY, doc: "The program that wrote the file: `mirrorstats` and its version." },
-    MetadataKey {
-        key: RECORDING_KEY,
-        doc: "How the recording was made, a JSON object. Of a recording of this program: scene, prompt and \
-              configuration hashes, view size, visibility threshold in pixels, seeds. Every trace may have the keys that \
-              follow.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.kind",
-        doc: "`recording`, `import`, or `reconstruction`: how the rows came to be.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.domain",
-        doc: "What the episodes are about: `mirror`, or any other name, where the columns of the mirror have no meaning. A file \
-              without it that has none of these columns is of its own domain.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.design",
-        doc: "What depends on what. `pairs`: `scene` where episodes with equal `scene` are pairs. `cluster`: `seed` where \
-              the runs of a seed share more than chance, null where they do not. What is not declared is not assumed.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.fingerprints",
-        doc: "By the values of the column `fingerprint`: SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and \
-              `sampling`, and `model`, the model's id as the provider returned it. `renderer`, where the agent saw frames: \
-              what drew them (`name`, `version`, `vendor`, and `processor`, what it may use of it), as it is.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.palette",
-        doc: "A list of lower-case names: all colours of the trace. Another value is refused.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.experiment",
-        doc: "The experiment as data, an object: `name`, `title`, `order`, `decision`, action set, `chance` and `reference` \
-              levels as under `[experiment.NAME]` of a definition file. Every command takes its episodes, whether the \
-              definitions know it or not; files that declare it must declare it alike. Where a definition file says \
-              something else, the definition file counts and `validate` says so.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.experiments",
-        doc: "The same of several experiments, a list of such objects.",
-    },
-    MetadataKey {
-        key: "mirrorstats.recording.registration",
-        doc: "The plan that was registered before the recording: its `sha256`, and that of the `definitions` that it names.",
-    },
-    MetadataKey {
-        key: CHECKSUMS_KEY,
-        doc: "CRC-32 of each column chunk over its raw bytes, page headers included, and of all behind the chunks, a JSON \
-              object: `algorithm`; `created_by`, that of the footer to which they apply, as programs that write a file \
-              again carry the key along; `chunks`, a list per row group of a checksum per column; `footer`, that of the \
-              bytes from the end of the last chunk to the end of the footer, its own eight digits as zeros. Verified \
-              where it applies.",
-    },
-];
 
 #[cfg(test)]
 mod tests {

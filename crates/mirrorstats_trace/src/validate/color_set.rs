@@ -211,28 +211,23 @@ impl Spellings {
         self.0.extend(names);
     }
 
-    /// The first row, by file, with another spelling of a colour in the set. The rows are read again only if two of the
-    /// names are spellings of one colour.
-    pub(crate) fn first_conflict(
-        &self,
-        files: &[TraceFile],
-        layout: &Layout,
-        threads: NonZeroUsize,
-    ) -> Result<Option<Finding>, TraceError> {
+    /// Errors: the first row, by file, with another spelling of a colour in the set. The rows are read again only if two
+    /// of the names are spellings of one colour.
+    pub(crate) fn check(&self, files: &[TraceFile], layout: &Layout, threads: NonZeroUsize) -> Result<(), TraceError> {
         let keys: BTreeSet<String> = self.0.iter().map(|name| spelling_key(name)).collect();
         if keys.len() == self.0.len() {
-            return Ok(None);
+            return Ok(());
         }
         let mut tally = Tally::new(files);
         let work = |episodes: Episodes| sightings(&files[episodes.file], layout, &episodes);
-        pass(files, layout, threads, &work, |file, event| {
-            match event {
-                ScanEvent::Whole(found) => tally.add(files, file, found),
-                ScanEvent::Fault(finding) => return Err(TraceError::from(finding)),
+        pass(files, layout, threads, &work, |file, event| match event {
+            ScanEvent::Whole(found) => {
+                tally.add(files, file, found);
+                Ok(())
             }
-            Ok(())
+            ScanEvent::Fault(finding) => Err(TraceError::from(finding)),
         })?;
         let mut found = tally.findings(files).into_iter().map(|(_, finding)| finding);
-        Ok(found.find(|finding| finding.code == Code::InvalidColor))
+        found.find(|finding| finding.code == Code::InvalidColor).map_or(Ok(()), |finding| Err(finding.into()))
     }
 }

@@ -31,83 +31,44 @@ fn hash(id: &str) -> u64 {
 #[derive(Default)]
 pub(crate) struct Prints(Vec<u64>);
 
-/// The end of the search for the first repeated id.
-struct Stop(Result<Option<Box<Finding>>, TraceError>);
-
-impl From<TraceError> for Stop {
-    fn from(error: TraceError) -> Self {
-        Self(Err(error))
-    }
-}
-
 impl Prints {
     pub(crate) fn add(&mut self, hashes: &[u64]) {
         self.0.extend_from_slice(hashes);
     }
 
-    /// The first episode, by file and row, that repeats the id of an earlier one, if any.
-    pub(crate) fn first_repeated(
-        self,
-        files: &[TraceFile],
-        layout: &Layout,
-    ) -> Result<Option<Box<Finding>>, TraceError> {
-        let alike = repeated_numbers(&self.0);
+    /// Errors: the first episode, by file and row, that repeats the id of an earlier one.
+    pub(crate) fn check(self, files: &[TraceFile], layout: &Layout) -> Result<(), TraceError> {
+        let count = self.0.len();
+        let alike = repeated_numbers(self.0);
         // Equal hashes nearly always mean equal ids.
-        if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, self.0.len()) }
+        if alike.is_empty() { Ok(()) } else { check_ids(files, layout, &alike, count) }
     }
 }
 
-fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
-    // A bit stands for all numbers with the same beginning. With 32 times as many bits as numbers, few numbers share a
-    // bit, and only those must be sorted.
-    let bits = (numbers.len() * 32).next_power_of_two().max(64);
-    let place = |number: u64| {
-        let bit = usize::try_from(number >> (u64::BITS - bits.ilog2())).expect("there are as many bits as this says");
-        (bit / 64, 1_u64 << (bit % 64))
-    };
-    let (mut once, mut twice) = (vec![0; bits / 64], vec![0; bits / 64]);
-    for number in numbers {
-        let (word, bit) = place(*number);
-        twice[word] |= once[word] & bit;
-        once[word] |= bit;
-    }
-    let comes_twice = |number: &u64| {
-        let (word, bit) = place(*number);
-        twice[word] & bit != 0
-    };
-    let mut shared: Vec<u64> = numbers.iter().copied().filter(comes_twice).collect();
-    shared.sort_unstable();
-    shared.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
+fn repeated_numbers(mut numbers: Vec<u64>) -> HashSet<u64> {
+    numbers.sort_unstable();
+    numbers.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
 }
 
 /// Reads the first `count` episodes again, in file order, and compares the ids with one of these hashes.
-fn first_equal(
-    files: &[TraceFile],
-    layout: &Layout,
-    alike: &HashSet<u64>,
-    count: usize,
-) -> Result<Option<Box<Finding>>, TraceError> {
+fn check_ids(files: &[TraceFile], layout: &Layout, alike: &HashSet<u64>, count: usize) -> Result<(), TraceError> {
     let (mut ids, mut left) = (SeenIds::default(), count);
     let name = |file: usize| files[file].name().to_owned();
-    let search = pass(files, layout, NonZeroUsize::MIN, &|episodes| starts(&episodes), |file, event| {
+    pass(files, layout, NonZeroUsize::MIN, &|episodes| starts(&episodes), |file, event| {
         let starts = match event {
             ScanEvent::Whole(starts) => starts,
-            ScanEvent::Fault(finding) => return Err(TraceError::from(finding).into()),
+            ScanEvent::Fault(finding) if left > 0 => return Err(finding.into()),
+            ScanEvent::Fault(_) => return Ok(()),
         };
-        for start in starts {
-            if left == 0 {
-                return Err(Stop(Ok(None)));
-            }
-            left -= 1;
-            if alike.contains(&hash(&start.id))
-                && let Some(Located { finding, .. }) = ids.admit(start, file, name)
-            {
-                return Err(Stop(Ok(Some(Box::new(finding)))));
+        let counted = starts.len().min(left);
+        left -= counted;
+        for start in starts.into_iter().take(counted).filter(|start| alike.contains(&hash(&start.id))) {
+            if let Some(Located { finding, .. }) = ids.admit(start, file, name) {
+                return Err(finding.into());
             }
         }
         Ok(())
-    });
-    search.map_or_else(|Stop(end)| end, |()| Ok(None))
+    })
 }
 
 /// The finding for a repeated id: in another file if `other` names it; `groups` are the first and second row group.
@@ -179,7 +140,7 @@ mod tests {
                 *times.entry(*number).or_default() += 1;
             }
             times.retain(|_, times| *times > 1);
-            prop_assert_eq!(repeated_numbers(&numbers), times.into_keys().collect::<HashSet<u64>>());
+            prop_assert_eq!(repeated_numbers(numbers.clone()), times.into_keys().collect::<HashSet<u64>>());
         }
     }
 
@@ -204,11 +165,11 @@ mod tests {
         .unwrap();
         assert_eq!(all.len(), 840);
         // As if all hashes were equal: the ids themselves are compared, those of the first file twice.
-        assert!(first_equal(set.files(), &layout, &all, 840).unwrap().is_none());
+        assert!(check_ids(set.files(), &layout, &all, 840).is_ok());
         let twice = TraceSet::open(&[&inputs[..1], &inputs].concat()).unwrap();
-        let found = first_equal(twice.files(), &layout, &all, 861).unwrap().unwrap();
-        assert_eq!(found.code, Code::EpisodeInTwoFiles);
+        let found = check_ids(twice.files(), &layout, &all, 861).unwrap_err().to_string();
+        assert!(found.starts_with("episode-in-two-files"), "{found}");
         // Only the first 21 episodes count, before the repetitions.
-        assert!(first_equal(twice.files(), &layout, &all, 21).unwrap().is_none());
+        assert!(check_ids(twice.files(), &layout, &all, 21).is_ok());
     }
 }

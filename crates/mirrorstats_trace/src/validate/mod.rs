@@ -6,6 +6,7 @@
 pub(crate) mod color_set;
 pub(crate) mod duplicate_ids;
 pub(crate) mod episode_hashes;
+pub mod replies;
 pub(crate) mod rules;
 
 use std::collections::{BTreeMap, HashMap};
@@ -19,7 +20,6 @@ use serde::Serialize;
 use super::copies::{Copied, copies};
 use super::diagnostic::{Code, Finding, Severity};
 use super::episodes::answers;
-use super::episodes::replies::{REPLY_STATUS, ReplyCounts, statuses};
 use super::error::TraceError;
 use super::inputs::Input;
 use super::read::open::{TraceFile, TraceSet};
@@ -27,6 +27,7 @@ use super::read::parallel_scan::{Episodes, ScanEvent, pass};
 use super::read::projection::Layout;
 use super::read::verify::verify_columns;
 use super::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
+use super::validate::replies::{REPLY_STATUS, ReplyCounts, statuses};
 use color_set::{Tally, sightings};
 use duplicate_ids::{SeenIds, Start, starts};
 use mirrorstats_parquet_pages::checksums::Checksums;
@@ -115,58 +116,51 @@ pub fn validate(
     validate_as(inputs, Expected { experiments, ..Expected::default() }, threads)
 }
 
+/// The checks of one file so far.
+struct FileCheck {
+    file: CheckedFile,
+    findings: Vec<Finding>,
+    replies: ReplyCounts,
+}
+
 pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsize) -> Result<Validation, TraceError> {
-    let mut report = Validation::default();
-    let mut found: Vec<Vec<Finding>> = Vec::new();
-    let (mut opened, mut places) = (Vec::new(), Vec::new());
     let mut files: Vec<_> = inputs.iter().map(TraceFile::open).collect();
     refuse_strangers(&mut files, expected);
-    for (place, (input, file)) in inputs.iter().zip(files).enumerate() {
+    let (mut checks, mut opened, mut places) = (Vec::new(), Vec::new(), Vec::new());
+    for (input, file) in inputs.iter().zip(files) {
         let checksums = file.as_ref().map(TraceFile::checksums).unwrap_or_default();
-        let (name, complete) = (input.name.clone(), file.is_ok());
-        report.files.push(CheckedFile { name, complete, episodes: 0, steps: 0, checksums });
-        match file {
+        let about = CheckedFile { name: input.name.clone(), complete: file.is_ok(), episodes: 0, steps: 0, checksums };
+        let findings = match file {
             Ok(file) => {
                 opened.push(file);
-                places.push(place);
-                found.push(Vec::new());
+                places.push(checks.len());
+                Vec::new()
             }
-            Err(findings) => found.push(findings),
-        }
+            Err(findings) => findings,
+        };
+        checks.push(FileCheck { file: about, findings, replies: ReplyCounts::default() });
     }
     let set = TraceSet::of(opened);
     let known = expected.experiments.map(|known| with_declared(known, &set));
-    let mut replies = vec![ReplyCounts::default(); inputs.len()];
-    check_rows(&set, Expected { experiments: known.as_deref(), ..expected }, threads, |file, checked| {
-        let place = places[file];
-        match checked {
-            ScanEvent::Fault(finding) => {
-                report.files[place].complete = false;
-                found[place].push(*finding);
-            }
-            ScanEvent::Whole(checked) => {
-                report.files[place].episodes += checked.episodes;
-                report.files[place].steps += checked.steps;
-                found[place].extend(checked.findings);
-                replies[place].merge(&checked.replies);
-            }
-        }
-    })?;
+    let expected = Expected { experiments: known.as_deref(), ..expected };
+    check_rows(&set, expected, threads, &places, &mut checks)?;
     for (file, place) in set.files().iter().zip(&places) {
-        if report.files[*place].complete
+        let check = &mut checks[*place];
+        if check.file.complete
             && let Err(finding) = verify_columns(file, |name| set.domain().column(name).is_none())
         {
-            report.files[*place].complete = false;
-            found[*place].push(*finding);
+            check.file.complete = false;
+            check.findings.push(*finding);
         }
-        found[*place].extend(stale(file));
+        check.findings.extend(stale(file));
     }
-    for ((found, input), mut replies) in found.iter_mut().zip(inputs).zip(replies) {
+    let mut report = Validation::default();
+    for FileCheck { file, findings, mut replies } in checks {
         // A status outside the schema has a finding already.
         replies.unreadable.retain(|status, _| statuses().contains(&status.as_str()));
-        found.extend(unreadable(&input.name, &replies));
+        report.findings.extend(findings.into_iter().chain(unreadable(&file.name, &replies)));
+        report.files.push(file);
     }
-    report.findings = found.into_iter().flatten().collect();
     Ok(report)
 }
 
@@ -203,18 +197,12 @@ fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
     (bad > 0).then(finding)
 }
 
-struct ValidatedFile {
-    findings: Vec<Finding>,
-    episodes: u64,
-    steps: u64,
-    replies: ReplyCounts,
-}
-
 fn check_rows(
     set: &TraceSet,
     expected: Expected<'_>,
     threads: NonZeroUsize,
-    mut receive: impl FnMut(usize, ScanEvent<ValidatedFile>),
+    places: &[usize],
+    checks: &mut [FileCheck],
 ) -> Result<(), TraceError> {
     let known = COLUMNS.iter().filter(|column| set.domain().has(column)).map(|column| column.name);
     let declared = expected.declared.iter().filter(|_| set.domain() == Domain::Own).map(|own| own.name.as_str());
@@ -247,37 +235,35 @@ fn check_rows(
         let mut found = rules.check(&set.files()[episodes.file], &episodes);
         found.extend(split(&name(episodes.file), &episodes));
         found.extend(episode_hashes::check(&set.files()[episodes.file], &layout, &episodes));
-        let checked = ValidatedFile {
-            findings: Vec::new(),
-            episodes: episodes.len() as u64,
-            steps: episodes.columns[0].len() as u64,
-            replies: statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at])),
-        };
+        let replies = statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at]));
         let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
-        (found, colors, starts(&episodes), alike(&episodes), checked)
+        let rows = (episodes.len() as u64, episodes.columns[0].len() as u64);
+        (found, colors, starts(&episodes), alike(&episodes), replies, rows)
     };
     let (mut ids, mut tally) = (SeenIds::default(), Tally::new(set.files()));
     let mut alike = HashMap::new();
     pass(set.files(), &layout, threads, &work, |file, event| {
-        let event = match event {
-            ScanEvent::Fault(finding) => ScanEvent::Fault(finding),
-            ScanEvent::Whole((found, colors, starts, keys, checked)) => {
+        let check = &mut checks[places[file]];
+        match event {
+            ScanEvent::Fault(finding) => {
+                check.file.complete = false;
+                check.findings.push(*finding);
+            }
+            ScanEvent::Whole((found, colors, starts, keys, replies, (episodes, steps))) => {
                 tally.add(set.files(), file, colors);
                 for (key, id) in keys.into_iter().filter(|_| !expected.errors_alone) {
                     alike.entry(key).or_insert_with(Vec::new).push((id, file));
                 }
-                ScanEvent::Whole(ValidatedFile {
-                    findings: with_repeated(found, starts, &mut ids, file, name),
-                    ..checked
-                })
+                check.file.episodes += episodes;
+                check.file.steps += steps;
+                check.findings.extend(with_repeated(found, starts, &mut ids, file, name));
+                check.replies.merge(&replies);
             }
-        };
-        receive(file, event);
+        }
         Ok::<_, TraceError>(())
     })?;
     for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, alike, threads)) {
-        let checked = ValidatedFile { findings: vec![finding], episodes: 0, steps: 0, replies: ReplyCounts::default() };
-        receive(file, ScanEvent::Whole(checked));
+        checks[places[file]].findings.push(finding);
     }
     Ok(())
 }

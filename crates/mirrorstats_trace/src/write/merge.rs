@@ -23,9 +23,9 @@ use crate::episodes::episode_hash::{self, EPISODE_HASH};
 use crate::error::TraceError;
 use crate::inputs::Input;
 use crate::read::budget::{most_shown, most_values};
+use crate::read::flat::CheckedRows;
 use crate::read::footer::trace_file::is_nested;
-use crate::read::footer::{Extent, Footer, bounds, footer, plain};
-use crate::read::verify::damaged;
+use crate::read::footer::{Extent, Footer, bounds, footer};
 use crate::schema::{self, COLUMNS};
 use crate::write::row_groups::{Gathered, RowGroups, field};
 use crate::write::{self, OptionalColumns};
@@ -170,27 +170,28 @@ fn decode(
     if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
         return Err(failed(is_nested(name, &nested.path().parts()[0]).to_string().into()));
     }
-    contained(|| {
-        let store = Store::new(file, Arc::new(Expansion::new(bytes)));
-        let slot = FaultSlot::default();
-        let (metadata, kept) = (Arc::new(metadata), Arc::clone(&slot));
-        let library = Library { store, metadata, checksums: chunks, row_groups, slot: kept, writes_out: true };
-        let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
-        let (selection, most) = selection.unzip();
-        let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, selection);
-        let (mut batches, mut held) = (Vec::new(), 0);
-        for batch in reader.map_err(|error| damaged(plain(&error)))? {
-            let batch = batch.map_err(|error| damaged(error.to_string()))?;
-            held += batch.get_array_memory_size() as u64;
-            let checked = most.map_or(Ok(()), |most| most.check(held));
-            checked.map_err(|exceeded| TraceError::from(Finding::over_budget(name, &exceeded)))?;
-            batches.push(batch);
-        }
-        let Some(first) = batches.first() else { return Ok(Vec::new()) };
-        let rows = concat_batches(&first.schema(), &batches).map_err(|error| failed(error.into()))?;
-        episodes(&rows).map_err(|fault| failed(fault.into()))
-    })
-    .unwrap_or_else(|fault| Err(failed(fault.into())))
+    let (selection, most) = selection.unzip();
+    let library = Library {
+        store: Store::new(file, Arc::new(Expansion::new(bytes))),
+        metadata: Arc::new(metadata),
+        checksums: chunks,
+        row_groups,
+        slot: FaultSlot::default(),
+        writes_out: true,
+    };
+    let rows = CheckedRows::open(name, &library, ProjectionMask::all(), None, BATCH_ROWS, selection);
+    let (mut batches, mut held) = (Vec::new(), 0);
+    for batch in rows.map_err(|finding| damaged_file(name, &finding))? {
+        let batch = batch.map_err(|finding| damaged_file(name, &finding))?;
+        held += batch.get_array_memory_size() as u64;
+        let checked = most.map_or(Ok(()), |most| most.check(held));
+        checked.map_err(|exceeded| TraceError::from(Finding::over_budget(name, &exceeded)))?;
+        batches.push(batch);
+    }
+    let Some(first) = batches.first() else { return Ok(Vec::new()) };
+    contained(|| concat_batches(&first.schema(), &batches).map_err(|error| error.to_string()))
+        .and_then(|rows| episodes(&rows?))
+        .map_err(|fault| failed(fault.into()))
 }
 
 fn unreadable(name: &str, source: Box<dyn std::error::Error + Send + Sync>) -> TraceError {

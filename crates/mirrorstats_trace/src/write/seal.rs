@@ -25,8 +25,8 @@ use crate::read::footer::Extent;
 use crate::read::open::{TraceFile, TraceSet};
 use crate::read::verify::verify_pages;
 use crate::validate::validate;
-use mirrorstats_exact::hash;
-use mirrorstats_exact::replace::{NewFile, TargetIsInput, TemporaryFolder, check_target, folder_of};
+use mirrorstats_exact::replace::{NewFile, TargetIsInput, check_target};
+use mirrorstats_exact::{hash, input};
 use mirrorstats_parquet_pages::checksums::{self, CREATED_BY, Checksums, Held};
 use mirrorstats_parquet_pages::rows_of;
 
@@ -59,26 +59,20 @@ pub enum SealError {
 
 /// Copies a trace to `out` with checksums. Before the copy is put in place, two things are checked: the trace keeps
 /// every rule of the schema, and each column of the copy has the same bytes.
-pub fn seal(input: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnswer, SealError> {
-    check_target(out, [&input.path], "the trace itself")?;
+pub fn seal(trace: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnswer, SealError> {
+    check_target(out, [&trace.path], "the trace itself")?;
     let unwritable = |source| SealError::Unwritable { path: out.to_owned(), source };
-    let set = TraceSet::open(slice::from_ref(input))?;
-    sound(input, threads)?;
-    let name = out.file_name().unwrap_or_default().to_string_lossy();
-    let stage = TemporaryFolder::create(folder_of(out), &name).map_err(unwritable)?;
-    let staged = stage.path().join("copy.parquet");
-    let file = File::create(&staged).map_err(unwritable)?;
-    copy_with_checksums(&set, file).map_err(|error| error.writing(out))?;
-    let copy = Input { name: Input::new(out).name, path: staged };
+    let set = TraceSet::open(slice::from_ref(trace))?;
+    sound(trace, threads)?;
+    let new = NewFile::create(out).map_err(unwritable)?;
+    let new = copy_with_checksums(&set, new).map_err(|error| error.writing(out))?;
+    let copy = Input { name: Input::new(out).name, path: new.temporary_path().to_owned() };
     let (episodes, steps) = sound(&copy, threads)?;
     compare(&set.files()[0], &TraceSet::open(slice::from_ref(&copy))?.files()[0])?;
-    let mut new = NewFile::create(out).map_err(unwritable)?;
-    let mut reader = File::open(&copy.path).map_err(unwritable)?;
-    io::copy(&mut reader, new.as_file_mut()).map_err(unwritable)?;
-    let sha256 = reader.rewind().and_then(|()| hash::of_reader(reader)).map_err(unwritable)?;
+    let sha256 = input::open(&copy.path).and_then(hash::of_reader).map_err(unwritable)?;
     new.commit().map_err(unwritable)?;
     let checksums_before = set.files()[0].checksums();
-    Ok(SealAnswer { name: input.name.clone(), out: copy.name, episodes, steps, checksums_before, sha256 })
+    Ok(SealAnswer { name: trace.name.clone(), out: copy.name, episodes, steps, checksums_before, sha256 })
 }
 
 /// Checks every rule of the schema; returns the numbers of episodes and steps.

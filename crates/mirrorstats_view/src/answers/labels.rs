@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use crate::{Snapshot, View, ViewError};
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_score::tables::table::EpisodeTable;
-use mirrorstats_trace::episodes::labels::{LabelLine, Mark, PREFIX, append, list_beside};
+use mirrorstats_trace::beside::label_line::LabelLine;
+use mirrorstats_trace::beside::labels::{Mark, PREFIX, append, list_beside};
 use mirrorstats_trace::read::open::TraceSet;
 
 /// A label as sent by a page; the server knows the coder's name.

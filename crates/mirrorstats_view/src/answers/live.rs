@@ -10,7 +10,7 @@ use crate::snapshot::Running;
 use crate::{Snapshot, View, ViewError};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::fixed;
-use mirrorstats_trace::episodes::replies::ReplyCounts;
+use mirrorstats_trace::validate::replies::ReplyCounts;
 
 const PAUSE: Duration = Duration::from_millis(400);
 /// The time over which the rate of steps is measured.

@@ -5,7 +5,7 @@
 use serde_json::{Map, Value, json};
 
 use mirrorstats_exact::hash;
-use mirrorstats_trace::renderer::Renderer;
+use mirrorstats_trace::footers::renderer::Renderer;
 
 /// Digits of a fingerprint's id: enough for all recordings of a study, and short in a table.
 const DIGITS: usize = 16;

@@ -15,7 +15,7 @@ use super::plan::{Key, Subject};
 use crate::agent::locked;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::episodes::episode::Step;
-use mirrorstats_trace::episodes::replies::ReplyCounts;
+use mirrorstats_trace::validate::replies::ReplyCounts;
 
 /// Characters of a reply to show.
 const SHOWN: usize = 200;

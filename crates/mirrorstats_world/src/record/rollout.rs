@@ -22,7 +22,7 @@ use crate::sim::world::World;
 use mirrorstats_trace::episodes::episode::{Episode, Extra, Step};
 use mirrorstats_trace::episodes::frame::Frame;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_trace::renderer::Renderer;
+use mirrorstats_trace::footers::renderer::Renderer;
 
 pub trait Observer {
     fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {

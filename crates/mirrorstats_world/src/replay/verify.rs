@@ -20,9 +20,9 @@ use mirrorstats_exact::replace::TemporaryFolder;
 use mirrorstats_log::assemble;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::episodes::frame::{Frame, Likeness, TOLERANCE, likeness};
+use mirrorstats_trace::footers::renderer::{self, Renderer};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
-use mirrorstats_trace::renderer::{self, Renderer};
 use mirrorstats_trace::write::merge::{self, EpisodeRows};
 
 /// The limit of a replay's work: 11,000 steps with the usual grid, which take eight seconds; more for larger traces.

@@ -11,7 +11,7 @@ use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_study::Question;
-use mirrorstats_trace::episodes::labels::check_coder;
+use mirrorstats_trace::beside::label_line::check_coder;
 use mirrorstats_trace::inputs;
 use mirrorstats_view::{Options, View, ViewError, export, film, routes};
 use mirrorstats_web::{Guard, check_token, new_token};

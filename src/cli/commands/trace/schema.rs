@@ -86,7 +86,7 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
             &meaning(column),
         ]);
     }
-    let metadata = schema.metadata.iter().map(|entry| [entry.key, entry.doc]);
+    let metadata = schema.metadata.iter().map(|entry| [&*entry.key, &*entry.doc]);
     let metadata = Table::of_texts(["footer key", "meaning"]).with(metadata);
     let rules = schema.rules.iter().map(|rule| [rule.code.name(), rule.rule]);
     let rules = Table::of_texts(["code", "rule"]).with(rules);

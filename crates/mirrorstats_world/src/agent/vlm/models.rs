@@ -18,7 +18,7 @@ use mirrorstats_exact::input;
 use mirrorstats_exact::names;
 use mirrorstats_exact::suggest::hint;
 use mirrorstats_toml_spec::{Faults, Source};
-use mirrorstats_trace::episodes::model_id::{OWN_SERVER, answers_for};
+use mirrorstats_trace::footers::model_id::{OWN_SERVER, answers_for};
 
 const BUILT_IN: &str = include_str!("../../../../../assets/models.toml");
 

@@ -11,8 +11,8 @@ use super::super::error::StoreError;
 use super::super::plan::{Key, Subject};
 use crate::agent::Lost;
 use crate::json_lines;
-use mirrorstats_trace::episodes::lost::LONGEST_LINE;
-pub use mirrorstats_trace::episodes::lost::{LostEpisode, list_of};
+use mirrorstats_trace::beside::lost::LONGEST_LINE;
+pub use mirrorstats_trace::beside::lost::{LostEpisode, list_of};
 
 pub(crate) fn lost_episode(key: &Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
     LostEpisode {
@@ -55,7 +55,7 @@ mod tests {
     use crate::agent::{Lost, Status};
     use crate::record::plan::{Key, Subject};
     use crate::sim::Experiment;
-    use mirrorstats_trace::episodes::lost::list_of;
+    use mirrorstats_trace::beside::lost::list_of;
 
     fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
         let key = Key::first(Experiment::E1, 1, run);

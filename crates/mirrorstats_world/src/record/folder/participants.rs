@@ -13,7 +13,7 @@ use super::super::lock::{FolderLock, WRITING, parts_of};
 use crate::agent::human::journal;
 use crate::agent::locked;
 use mirrorstats_log::assemble;
-use mirrorstats_trace::episodes::labels;
+use mirrorstats_trace::beside::labels;
 use mirrorstats_trace::write::merge::{self, EpisodeRows};
 
 /// The removed episodes.

@@ -29,7 +29,7 @@ use crate::agent::locked;
 use crate::sim::Experiment;
 use mirrorstats_log::{LogError, assemble};
 use mirrorstats_trace::episodes::episode::Episode;
-use mirrorstats_trace::renderer::{self, Renderer};
+use mirrorstats_trace::footers::renderer::{self, Renderer};
 use mirrorstats_trace::write::merge;
 use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 

@@ -21,7 +21,7 @@ use super::super::visibility::{self, Shown};
 use super::super::world::World;
 use crate::experiment::spec::{Look, PaneKind};
 use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_trace::renderer::Renderer;
+use mirrorstats_trace::footers::renderer::Renderer;
 
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {

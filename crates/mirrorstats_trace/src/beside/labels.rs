@@ -3,23 +3,21 @@
 //! Rule: the list only grows. A later line replaces an earlier one of the same coder, episode, step and label, so two
 //! lists can be concatenated.
 
-mod line;
-
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::OpenOptions;
 use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write as _};
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+
+use indexmap::IndexSet;
 
 use mirrorstats_exact::budget::{Budget, Limit};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::input;
 use mirrorstats_exact::replace::NewFile;
 
+use super::label_line::{LONGEST_LINE, LabelLine, LabelsError};
+use super::numbered_lines;
 use crate::inputs::Input;
-use line::LONGEST_LINE;
-pub use line::{InvalidLabel, LabelLine, LabelsError, check_coder};
 
 /// The prefix of column names: the label `confabulates` is the column `label_confabulates`.
 pub const PREFIX: &str = "label_";
@@ -96,67 +94,26 @@ pub struct Mark<'l> {
     pub note: Option<&'l str>,
 }
 
-/// The labels beside some traces. A million lines take about 30 MB.
+/// The labels beside some traces. A million lines take about 80 MB.
 #[derive(Clone, Debug, Default)]
 pub struct Labels {
-    episodes: Names,
-    coders: Names,
-    words: Names,
-    /// In order, one per key.
-    marks: Vec<Entry>,
-    notes: Vec<Box<str>>,
+    episodes: IndexSet<String>,
+    coders: IndexSet<String>,
+    words: IndexSet<String>,
+    /// The notes, by the last line of each key.
+    marks: BTreeMap<Key, Option<Box<str>>>,
 }
 
-#[derive(Clone, Debug, Default)]
-struct Names {
-    all: Vec<Arc<str>>,
-    numbers: HashMap<Arc<str>, u32>,
-}
-
-/// The step is 0 for the whole episode; the word is [`NONE`] without a label.
+/// The positions of names in their sets. The step is 0 for the whole episode; the word is [`NONE`] without a label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Key {
-    episode: u32,
+    episode: usize,
     step: u32,
-    word: u16,
-    coder: u16,
+    word: usize,
+    coder: usize,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    key: Key,
-    state: State,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    Removed,
-    Plain,
-    Note(u32),
-}
-
-const NONE: u16 = u16::MAX;
-
-impl Names {
-    fn number(&mut self, text: &str) -> u32 {
-        if let Some(number) = self.numbers.get(text) {
-            return *number;
-        }
-        let number = u32::try_from(self.all.len()).unwrap_or(u32::MAX);
-        let text: Arc<str> = text.into();
-        self.all.push(Arc::clone(&text));
-        self.numbers.insert(text, number);
-        number
-    }
-
-    fn get(&self, number: impl Into<u32>) -> &str {
-        usize::try_from(number.into()).ok().and_then(|at| self.all.get(at)).map_or("", |text| text)
-    }
-}
-
-fn narrow(number: u32) -> u16 {
-    u16::try_from(number).unwrap_or(NONE)
-}
+const NONE: usize = usize::MAX;
 
 impl Labels {
     /// The labels in the lists beside some traces; empty without lists.
@@ -166,24 +123,17 @@ impl Labels {
         for list in lists {
             labels.read(&list)?;
         }
-        Ok(labels.in_order())
+        Ok(labels)
     }
 
     fn read(&mut self, list: &Path) -> Result<(), LabelsError> {
         let failed = |source| LabelsError::Read { path: list.to_owned(), source };
-        let lines = match input::lines(list, LONGEST_LINE) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            lines => lines.map_err(failed)?,
-        };
         let exceeded = |source| LabelsError::Budget { path: list.to_owned(), source };
         let notes = Budget::new(MOST_NOTES);
-        for (at, line) in lines.enumerate() {
-            MOST_LINES.check(at as u64 + 1).map_err(exceeded)?;
-            let line = line.map_err(failed)?;
-            if line.trim_ascii().is_empty() {
-                continue;
-            }
-            let wrong = |problem| LabelsError::Line { path: list.to_owned(), line: at + 1, problem };
+        for line in numbered_lines(list, LONGEST_LINE).map_err(failed)? {
+            let (number, line) = line.map_err(failed)?;
+            MOST_LINES.check(number as u64).map_err(exceeded)?;
+            let wrong = |problem| LabelsError::Line { path: list.to_owned(), line: number, problem };
             let line: LabelLine = serde_json::from_slice(&line).map_err(|error| {
                 let found = error.to_string();
                 let found = found.split(" at line ").next().unwrap_or_default();
@@ -194,48 +144,25 @@ impl Labels {
             })?;
             line.check().map_err(|invalid| wrong(invalid.to_string()))?;
             notes.spend(line.note.as_ref().map_or(0, |note| note.len() as u64)).map_err(exceeded)?;
-            self.add(&line);
-            MOST_CODERS.check(self.coders.all.len() as u64).map_err(exceeded)?;
-            MOST_WORDS.check(self.words.all.len() as u64).map_err(exceeded)?;
+            self.add(line);
+            MOST_CODERS.check(self.coders.len() as u64).map_err(exceeded)?;
+            MOST_WORDS.check(self.words.len() as u64).map_err(exceeded)?;
         }
         Ok(())
     }
 
-    fn add(&mut self, line: &LabelLine) {
-        let word = line.label.as_deref().map_or(NONE, |word| narrow(self.words.number(word)));
-        let coder = narrow(self.coders.number(&line.coder));
-        let key = Key { episode: self.episodes.number(&line.episode_id), step: line.step.unwrap_or(0), word, coder };
-        let note = line.note.as_deref().filter(|note| !note.is_empty());
-        let state = match (line.removed, note) {
-            (true, _) => State::Removed,
-            (false, None) => State::Plain,
-            (false, Some(note)) => {
-                self.notes.push(note.into());
-                State::Note(u32::try_from(self.notes.len() - 1).unwrap_or(u32::MAX))
-            }
+    fn add(&mut self, line: LabelLine) {
+        let key = Key {
+            episode: self.episodes.insert_full(line.episode_id).0,
+            step: line.step.unwrap_or(0),
+            word: line.label.map_or(NONE, |word| self.words.insert_full(word).0),
+            coder: self.coders.insert_full(line.coder).0,
         };
-        self.marks.push(Entry { key, state });
-    }
-
-    /// Keeps the last line of each key, and only the notes in use.
-    fn in_order(mut self) -> Self {
-        self.marks.sort_by_key(|entry| entry.key);
-        let mut kept: Vec<Entry> = Vec::new();
-        for entry in self.marks.drain(..) {
-            match kept.last_mut() {
-                Some(last) if last.key == entry.key => *last = entry,
-                _ => kept.push(entry),
-            }
+        if line.removed {
+            self.marks.remove(&key);
+        } else {
+            self.marks.insert(key, line.note.filter(|note| !note.is_empty()).map(Into::into));
         }
-        kept.retain(|entry| entry.state != State::Removed);
-        let mut notes = Vec::new();
-        for entry in &mut kept {
-            let State::Note(number) = &mut entry.state else { continue };
-            notes.push(std::mem::take(&mut self.notes[*number as usize]));
-            *number = u32::try_from(notes.len() - 1).unwrap_or(u32::MAX);
-        }
-        kept.shrink_to_fit();
-        Self { marks: kept, notes, ..self }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -244,8 +171,7 @@ impl Labels {
 
     /// The labels in use, in alphabetical order.
     pub fn words(&self) -> BTreeSet<&str> {
-        let used: BTreeSet<u16> = self.marks.iter().map(|entry| entry.key.word).filter(|word| *word != NONE).collect();
-        used.into_iter().map(|word| self.words.get(word)).collect()
+        self.marks.keys().filter_map(|key| self.words.get_index(key.word)).map(String::as_str).collect()
     }
 
     pub fn columns(&self) -> Vec<String> {
@@ -254,49 +180,40 @@ impl Labels {
 
     pub fn episodes(&self) -> impl Iterator<Item = &str> {
         let mut last = None;
-        let numbers = self.marks.iter().map(|entry| entry.key.episode);
-        numbers.filter(move |number| last.replace(*number) != Some(*number)).map(|number| self.episodes.get(number))
+        let numbers = self.marks.keys().map(|key| key.episode);
+        numbers.filter(move |number| last.replace(*number) != Some(*number)).map(|number| &*self.episodes[number])
     }
 
     /// The marks of an episode: its own, then those of its steps.
     pub fn of_episode(&self, id: &str) -> impl Iterator<Item = Mark<'_>> {
-        self.marks[self.range(id)].iter().map(|entry| self.mark(entry))
+        let start = |episode| Key { episode, step: 0, word: 0, coder: 0 };
+        let known = self.episodes.get_index_of(id);
+        let marks = known.map(|episode| self.marks.range(start(episode)..start(episode + 1)));
+        marks.into_iter().flatten().map(|(key, note)| self.mark(*key, note.as_deref()))
     }
 
     /// The value of a column: true if a coder gave the label to the episode or a step, false if coders gave only
     /// others, null if no coder saw the episode.
     pub fn value(&self, column: &str, id: &str) -> Option<bool> {
-        let number = column.strip_prefix(PREFIX).and_then(|word| self.words.numbers.get(word));
-        let word = number.map_or(NONE, |number| narrow(*number));
-        let marks = &self.marks[self.range(id)];
-        (!marks.is_empty()).then(|| word != NONE && marks.iter().any(|entry| entry.key.word == word))
+        let word = column.strip_prefix(PREFIX);
+        let mut marks = self.of_episode(id).peekable();
+        marks.peek()?;
+        Some(word.is_some() && marks.any(|mark| mark.label == word))
     }
 
     /// The labels of each coder by episode; an empty set if the coder gave none.
     pub fn by_coder(&self) -> BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> {
         let mut coders: BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> = BTreeMap::new();
-        for entry in &self.marks {
-            let Mark { coder, label, .. } = self.mark(entry);
-            let episodes = coders.entry(coder).or_default();
-            episodes.entry(self.episodes.get(entry.key.episode)).or_default().extend(label);
+        for (key, note) in &self.marks {
+            let Mark { coder, label, .. } = self.mark(*key, note.as_deref());
+            coders.entry(coder).or_default().entry(&self.episodes[key.episode]).or_default().extend(label);
         }
         coders
     }
 
-    fn range(&self, id: &str) -> Range<usize> {
-        let Some(number) = self.episodes.numbers.get(id) else { return 0..0 };
-        let start = self.marks.partition_point(|entry| entry.key.episode < *number);
-        start..self.marks.partition_point(|entry| entry.key.episode <= *number)
-    }
-
-    fn mark(&self, entry: &Entry) -> Mark<'_> {
-        let Key { step, word, coder, .. } = entry.key;
-        let note = match entry.state {
-            State::Note(number) => self.notes.get(number as usize).map(|note| &**note),
-            State::Plain | State::Removed => None,
-        };
-        let label = (word != NONE).then(|| self.words.get(word));
-        Mark { coder: self.coders.get(coder), step: (step > 0).then_some(step), label, note }
+    fn mark<'l>(&'l self, Key { step, word, coder, .. }: Key, note: Option<&'l str>) -> Mark<'l> {
+        let label = self.words.get_index(word).map(String::as_str);
+        Mark { coder: &self.coders[coder], step: (step > 0).then_some(step), label, note }
     }
 }
 

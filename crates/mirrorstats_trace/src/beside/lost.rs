@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::numbered_lines;
 use crate::inputs::Input;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
-use mirrorstats_exact::input;
 
 /// A line names an episode and its failure; both are short.
 pub const LONGEST_LINE: Limit = Limit::new("bytes in a line of a list of lost episodes", 1 << 20);
@@ -58,22 +58,14 @@ pub fn list_of(folder: &Path) -> PathBuf {
 /// The contents of a list; empty if the file does not exist.
 pub fn read(path: &Path) -> Result<Vec<LostEpisode>, LostListError> {
     let failed = |source| LostListError::Io { path: path.to_owned(), source };
-    let lines = match input::lines(path, LONGEST_LINE) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        lines => lines.map_err(failed)?,
-    };
     let mut found = Vec::new();
-    for (at, line) in lines.enumerate() {
-        let line = line.map_err(failed)?;
-        if line.trim_ascii().is_empty() {
-            continue;
-        }
-        let episode = serde_json::from_slice(&line).map_err(|error| LostListError::Line {
-            path: path.to_owned(),
-            line: at + 1,
-            found: visible(&error.to_string()),
-        });
-        found.push(episode?);
+    for line in numbered_lines(path, LONGEST_LINE).map_err(failed)? {
+        let (line, text) = line.map_err(failed)?;
+        let wrong = |error: serde_json::Error| {
+            let found = visible(&error.to_string());
+            LostListError::Line { path: path.to_owned(), line, found }
+        };
+        found.push(serde_json::from_slice(&text).map_err(wrong)?);
     }
     Ok(found)
 }

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::read::open::TraceFile;
+use crate::read::open::TraceFile;
 use mirrorstats_exact::escape::visible;
 
 /// A renderer, the part `renderer` of a fingerprint.
@@ -43,7 +43,7 @@ pub fn of_files(files: &[TraceFile]) -> Vec<Renderer> {
 }
 
 /// A sentence with the renderers of some traces; `None` if no agent saw frames, or the renderers are unknown.
-pub fn told(renderers: &[Renderer]) -> Option<String> {
+pub fn note(renderers: &[Renderer]) -> Option<String> {
     let names: Vec<String> = renderers.iter().map(ToString::to_string).collect();
     match names.as_slice() {
         [] => None,

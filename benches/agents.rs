@@ -18,21 +18,21 @@ use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use mirrorstats_agents::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::lock::FolderLock;
+use mirrorstats_record::metadata;
+use mirrorstats_record::plan::{Key, Plan, Shard, Subject};
+use mirrorstats_record::run::{Progress, Recording, Settings};
+use mirrorstats_record::shares::{Shares, Spent};
+use mirrorstats_record::store::Store;
+use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::{Action, Step};
-use mirrorstats_world::agent::vlm::Vlm;
-use mirrorstats_world::agent::vlm::limits::Account;
-use mirrorstats_world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
-use mirrorstats_world::agent::vlm::provider::{Patience, Provider};
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
-use mirrorstats_world::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
-use mirrorstats_world::record::lock::FolderLock;
-use mirrorstats_world::record::metadata;
-use mirrorstats_world::record::plan::{Key, Plan, Shard, Subject};
-use mirrorstats_world::record::run::{Progress, Recording, Settings};
-use mirrorstats_world::record::shares::{Shares, Spent};
-use mirrorstats_world::record::store::Store;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Account;
+use mirrorstats_vlm::models::{Backend, Choice, Contract, Model, Prices};
+use mirrorstats_vlm::provider::{Patience, Provider};
+use mirrorstats_vlm::wire_format::Dialect;
 use tokio::runtime::Runtime;
 
 const IN_FLIGHT: usize = 64;
@@ -53,7 +53,7 @@ impl Agent for AtOnce {
             self_color: None,
             selected_cube: None,
             mark_report: None,
-            answers: mirrorstats_world::agent::Answers::new(),
+            answers: mirrorstats_agents::Answers::new(),
             words: Words::default(),
             raw: Some(REPLY.to_owned()),
             usage: Usage::default(),

@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
 use mirrorstats::cli::{self, Failure, Options};
-use mirrorstats_world::agent::Player;
-use mirrorstats_world::agent::exec::Images;
-use mirrorstats_world::agent::function::{Function, FunctionPlayer, Listener};
-use mirrorstats_world::record::lock::{FolderLock, parts_of};
+use mirrorstats_agents::Player;
+use mirrorstats_agents::exec::Images;
+use mirrorstats_agents::function::{Function, FunctionPlayer, Listener};
+use mirrorstats_record::lock::{FolderLock, parts_of};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 

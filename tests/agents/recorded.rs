@@ -5,19 +5,19 @@ use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_experiment::spec::Body;
+use mirrorstats_record::plan::{Key, Subject};
+use mirrorstats_record::rollout::{EpisodeStage, Nobody, head, play, task};
+use mirrorstats_record::shares::Shares;
 use mirrorstats_score::score_traces::{self, Request};
 use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_sim::camera::Camera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::scene::Scene;
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::write::OptionalColumns;
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::experiment::spec::Body;
-use mirrorstats_world::record::plan::{Key, Subject};
-use mirrorstats_world::record::rollout::{EpisodeStage, Nobody, head, play, task};
-use mirrorstats_world::record::shares::Shares;
-use mirrorstats_world::sim::camera::Camera;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::scene::Scene;
-use mirrorstats_world::sim::world::World;
 
 use crate::harness::need;
 use crate::harness::traces::{open, write_trace};

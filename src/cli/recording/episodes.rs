@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 
 use crate::cli::Failure;
-use mirrorstats_world::agent::Planned;
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::record::error::StoreError;
-use mirrorstats_world::record::index::Place;
-use mirrorstats_world::record::plan::{Key, Plan, Subject};
+use mirrorstats_agents::Planned;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::error::StoreError;
+use mirrorstats_record::index::Place;
+use mirrorstats_record::plan::{Key, Plan, Subject};
 
 pub struct Episodes {
     pub planned: Vec<Key>,

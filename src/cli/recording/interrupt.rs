@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::cli::Failure;
-use mirrorstats_world::agent::Player;
+use mirrorstats_agents::Player;
 
 pub type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 

@@ -21,17 +21,17 @@ use serde::Serialize;
 
 use crate::cli::NAME;
 use crate::cli::scoring::commands;
+use mirrorstats_agents::spend::Spend;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_exact::number::Decimal;
+use mirrorstats_record::failures::LostEpisode;
+use mirrorstats_record::replies::{RepliesAnswer, UnreadableReply};
+use mirrorstats_record::shares::Spent;
 use mirrorstats_report::html;
 use mirrorstats_study::{Study, StudyError};
 use mirrorstats_trace::episodes::replies::ReplyCounts;
 use mirrorstats_trace::renderer::Renderer;
-use mirrorstats_world::agent::vlm::limits::Spend;
-use mirrorstats_world::record::failures::LostEpisode;
-use mirrorstats_world::record::replies::{RepliesAnswer, UnreadableReply};
-use mirrorstats_world::record::shares::Spent;
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -220,8 +220,8 @@ mod tests {
     use std::time::Duration;
 
     use super::{dollars, shares, spent};
-    use mirrorstats_world::agent::vlm::limits::Spend;
-    use mirrorstats_world::record::shares::Spent;
+    use mirrorstats_agents::spend::Spend;
+    use mirrorstats_record::shares::Spent;
 
     #[test]
     fn unknown_costs_are_printed_as_unknown() {

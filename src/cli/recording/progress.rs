@@ -10,15 +10,15 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::{spent, unreadable};
+use mirrorstats_agents::Player;
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_exact::format::fixed;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::plan::{Key, Subject};
+use mirrorstats_record::replies::{Replies, RepliesAnswer};
+use mirrorstats_record::run::Progress;
+use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::Step;
-use mirrorstats_world::agent::Player;
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::record::plan::{Key, Subject};
-use mirrorstats_world::record::replies::{Replies, RepliesAnswer};
-use mirrorstats_world::record::run::Progress;
-use mirrorstats_world::sim::config::WorldConfig;
 
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
@@ -185,13 +185,13 @@ mod tests {
     use std::time::Duration;
 
     use super::{Bar, rate, time_left};
+    use mirrorstats_agents::scripted::Scripted;
+    use mirrorstats_agents::{Player, exec};
+    use mirrorstats_experiment::Experiment;
+    use mirrorstats_record::plan::{Key, Subject};
+    use mirrorstats_record::run::Progress as _;
+    use mirrorstats_sim::config::WorldConfig;
     use mirrorstats_trace::episodes::episode::{Extra, Step};
-    use mirrorstats_world::agent::scripted::Scripted;
-    use mirrorstats_world::agent::{Player, exec};
-    use mirrorstats_world::experiment::Experiment;
-    use mirrorstats_world::record::plan::{Key, Subject};
-    use mirrorstats_world::record::run::Progress as _;
-    use mirrorstats_world::sim::config::WorldConfig;
 
     #[test]
     fn the_progress_counts_unreadable_replies() {

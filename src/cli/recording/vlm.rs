@@ -8,18 +8,19 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use crate::cli::{Failure, output};
+use mirrorstats_agents::secrets::Secret;
+use mirrorstats_agents::spend::Spend;
+use mirrorstats_agents::{Agent, Lost, Player, Task};
 use mirrorstats_exact::escape::visible;
+use mirrorstats_experiment::Spec;
+use mirrorstats_record::plan::slug;
 use mirrorstats_trace::episodes::model_id::OWN_SERVER;
-use mirrorstats_world::agent::vlm::Vlm;
-use mirrorstats_world::agent::vlm::limits::{Account, Limits, Spend};
-use mirrorstats_world::agent::vlm::models::{Choice, Models, ModelsError};
-use mirrorstats_world::agent::vlm::probe::{ProbeAnswer, probe};
-use mirrorstats_world::agent::vlm::provider::{Patience, Provider, check_transport};
-use mirrorstats_world::agent::vlm::secrets::Secret;
-use mirrorstats_world::agent::vlm::wire_format::{Dialect, Effort};
-use mirrorstats_world::agent::{Agent, Lost, Player, Task};
-use mirrorstats_world::experiment::Spec;
-use mirrorstats_world::record::plan::slug;
+use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::{Account, Limits};
+use mirrorstats_vlm::models::{Choice, Models, ModelsError};
+use mirrorstats_vlm::probe::{ProbeAnswer, probe};
+use mirrorstats_vlm::provider::{Patience, Provider, check_transport};
+use mirrorstats_vlm::wire_format::{Dialect, Effort};
 
 /// A service tier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

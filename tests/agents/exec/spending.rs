@@ -1,7 +1,7 @@
 //! A model behind a server on loopback, from the command line: the spending is reported, and a failing server loses an
 //! episode under the failure's name.
 
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::Value;
 
 use super::recordings::{Bench, FORWARD, done, outcome};

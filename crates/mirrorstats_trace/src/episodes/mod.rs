@@ -6,5 +6,6 @@ pub mod identification;
 pub mod labels;
 pub mod lost;
 pub mod model_id;
+pub mod moments;
 pub mod palette;
 pub mod replies;

@@ -9,7 +9,6 @@ use mirrorstats_agents::scripted::Scripted;
 use mirrorstats_experiment::spec::Body;
 use mirrorstats_record::plan::{Key, Subject};
 use mirrorstats_record::rollout::{EpisodeStage, Nobody, head, play, task};
-use mirrorstats_record::shares::Shares;
 use mirrorstats_score::score_traces::{self, Request};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_sim::camera::Camera;
@@ -29,7 +28,7 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
     let mut player = agent.agent(&task(config, &scene, key));
     let episode = head(config, &scene, key, &Subject::of(agent.name()));
     let mut world = World::new(config, scene).unwrap();
-    let stage = EpisodeStage { config, eye, looks: true, stop: &AtomicBool::new(false), shares: &Shares::default() };
+    let stage = EpisodeStage { config, eye, looks: true, stop: &AtomicBool::new(false) };
     ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
 }
 

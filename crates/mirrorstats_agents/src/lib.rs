@@ -24,10 +24,8 @@ pub mod reply;
 pub mod scripted;
 #[cfg(feature = "play")]
 pub mod secrets;
-#[cfg(feature = "play")]
-pub mod spend;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -277,15 +275,6 @@ pub enum Ended {
     Stopped,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Planned {
-    pub episode_id: String,
-    pub experiment: String,
-    pub seed: i32,
-    pub repetition: i32,
-    pub is_recorded: bool,
-}
-
 /// The availability of an episode's player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
@@ -315,50 +304,11 @@ pub trait Player: Send + Sync {
         false
     }
 
-    fn in_flight(&self) -> usize {
-        1
-    }
-
-    fn most_in_flight(&self) -> usize {
-        usize::MAX
-    }
-
-    fn plans(&self, _planned: &[Planned]) {}
-
-    fn turn(&self, _episode_id: &str) -> Turn {
-        Turn::Now
-    }
-
-    /// Stops all waiting for people, since the recording is to stop.
-    fn interrupt(&self) {}
-
-    /// The ids of episodes that were deleted at their participants' request.
-    fn deleted(&self) -> Result<BTreeSet<String>, String> {
-        Ok(BTreeSet::new())
-    }
-
-    fn ended(&self, _is_complete: bool) {}
-
-    fn resumes(&self) {}
-
-    /// Returns true if the steps of an unfinished episode stay in a journal, from which the next start continues.
-    fn keeps_steps(&self) -> bool {
-        false
-    }
-
-    #[cfg(feature = "play")]
-    fn spend(&self) -> Option<spend::Spend> {
-        None
-    }
-
-    /// Checks, before the first episode, that the agents' requirements are met; sends no questions.
-    fn check(&self) -> Result<(), String> {
-        Ok(())
-    }
-
+    /// The reason why it can play no further episode.
     fn stopped(&self) -> Option<String> {
         None
     }
 
+    /// Ends what its agents have started outside this process, which ends at once.
     fn abandon(&self) {}
 }

@@ -27,5 +27,4 @@ pub mod replay;
 pub mod replies;
 pub mod rollout;
 pub mod run;
-pub mod shares;
 pub mod store;

@@ -6,11 +6,9 @@
 use std::cell::RefCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 use super::error::RecordError;
 use super::plan::{Key, Subject};
-use super::shares::Shares;
 use crate::replay::log::{Seen, frame_time};
 use mirrorstats_agents::{Agent, Observation, Past, Reply, Task};
 use mirrorstats_experiment::spec::Side;
@@ -46,7 +44,6 @@ pub struct EpisodeStage<'a> {
     pub looks: bool,
     /// Set when the recording is to stop.
     pub stop: &'a AtomicBool,
-    pub shares: &'a Shares,
 }
 
 impl EpisodeStage<'_> {
@@ -127,9 +124,7 @@ pub async fn play(
             frame: frame.clone().unwrap_or_else(|| Arc::new(Frame::new(0, 0, Vec::new()))),
             fov_y: world.config().eye.fovy,
         };
-        let start = Instant::now();
         let visibility = world.visibility();
-        stage.shares.visibility.add(start);
         let reply =
             agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: lost.step.or(Some(t)), lost })?;
         let action = reply.action;
@@ -150,9 +145,7 @@ pub async fn play(
         world.scene().experiment.put(Side::Truth, &truths, &mut row.extra);
         row.extra.frame_digest = frame.as_ref().filter(|_| stage.looks).map(|frame| frame.digest());
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
-        let start = Instant::now();
         bumped = world.act(action).bumped;
-        stage.shares.visibility.add(start);
         // Dropping the observation first avoids a copy.
         drop(observation);
         Arc::make_mut(&mut past).push(Past { action, bumped, thought: own_thought });
@@ -169,9 +162,7 @@ pub async fn play(
 
 fn look(stage: &EpisodeStage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {
     let Some(eye) = stage.eye else { return Ok(None) };
-    let start = Instant::now();
     let frame = eye.borrow_mut().frame(world).map_err(RecordError::fatal)?;
-    stage.shares.rendering.add(start);
     Ok(Some(Arc::new(frame)))
 }
 

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use std::io;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
@@ -19,10 +19,9 @@ use super::plan::{Key, Subject};
 use super::queue::{Next, Outcomes, Queue};
 use super::replies::{GivenUp, Unusable};
 use super::rollout::{self, EpisodeStage, Nobody, Observer, Played};
-use super::shares::Shares;
 use super::store::Store;
 use crate::replay::log::{Log, Seen};
-use mirrorstats_agents::{Agent, Ended, Lost, LostKind, Player};
+use mirrorstats_agents::{Agent, Ended, Lost, LostKind, Player, Turn};
 use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_sim::scene::Scene;
@@ -79,11 +78,12 @@ pub struct Tally {
 pub struct Recording<'a> {
     pub config: &'a WorldConfig,
     pub player: &'a dyn Player,
+    /// The availability of each episode's player, by the episode's id.
+    pub turn: &'a (dyn Fn(&str) -> Turn + Sync),
     pub subject: &'a Subject,
     pub store: &'a Store,
     pub progress: &'a dyn Progress,
     pub stop: &'a AtomicBool,
-    pub shares: &'a Shares,
     pub settings: Settings,
 }
 
@@ -140,9 +140,7 @@ impl Recording<'_> {
     }
 
     fn thread(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
-        let start = Instant::now();
         let result = self.episodes(queue, unusable, each);
-        self.shares.all.add(start);
         if result.is_err() {
             self.stop.store(true, Ordering::Relaxed);
         }
@@ -151,10 +149,8 @@ impl Recording<'_> {
 
     fn episodes(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let is_needed = self.settings.frames || self.player.looks();
-        let start = Instant::now();
         let eyes =
             is_needed.then(|| Eyes::of(self.config, queue.experiments())).transpose().map_err(RecordError::fatal)?;
-        self.shares.rendering.add(start);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
@@ -206,7 +202,7 @@ impl Recording<'_> {
         under_way: &mut FuturesUnordered<F>,
         play: impl Fn(Key) -> F,
     ) -> Next {
-        let turn = |key: &Key| self.player.turn(&key.episode_id(self.subject));
+        let turn = |key: &Key| (self.turn)(&key.episode_id(self.subject));
         while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
             match queue.next(turn) {
                 Next::Play(key) => under_way.push(play(key)),
@@ -222,17 +218,14 @@ impl Recording<'_> {
         eye: Option<&RefCell<Camera>>,
         unusable: &Unusable,
     ) -> Result<usize, RecordError> {
-        let start = Instant::now();
         let scene = Scene::draw(self.config, key.experiment.clone(), key.seed, key.run).map_err(RecordError::fatal)?;
         let mut episode = rollout::head(self.config, &scene, key, self.subject);
         let task = rollout::task(self.config, &scene, key);
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
-        self.shares.visibility.add(start);
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         episode.participant = agent.participant().map(str::to_owned);
-        let stage =
-            EpisodeStage { config: self.config, eye, looks: self.player.looks(), stop: self.stop, shares: self.shares };
+        let stage = EpisodeStage { config: self.config, eye, looks: self.player.looks(), stop: self.stop };
         if agent.wants_practice() {
             self.practise(&stage, agent.as_mut(), key).await?;
         }
@@ -271,7 +264,6 @@ impl Recording<'_> {
         played: &Played,
         log: Option<Log>,
     ) -> Result<(), RecordError> {
-        let start = Instant::now();
         let fingerprint = self.store.fingerprint(key, played.model.as_deref(), stage.renderer().as_ref());
         let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
         let episode = Episode { episode_hash: Some(episode_hash::of(&episode)), ..episode };
@@ -282,7 +274,6 @@ impl Recording<'_> {
         if let (Some(before), Some((t, after))) = (&played.model, &played.other_model) {
             self.progress.model_changed(&episode.episode_id, *t, before, after);
         }
-        self.shares.writing.add(start);
         Ok(())
     }
 
@@ -353,27 +344,23 @@ struct Observers<'a> {
 
 impl Observer for Observers<'_> {
     fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError> {
-        let start = Instant::now();
         if let Some(log) = &mut self.log {
             let frame = seen.frame.filter(|_| self.recording.settings.frames);
             log.seen(&Seen { frame, ..*seen }).map_err(RecordError::fatal)?;
         }
-        self.recording.shares.writing.add(start);
         Ok(())
     }
 
     fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError> {
-        let Recording { subject, progress, shares, stop, .. } = self.recording;
+        let Recording { subject, progress, stop, .. } = self.recording;
         progress.step(self.key, t, row);
         if self.unusable.add(subject, self.key, t, row, &mut self.in_a_row) {
             stop.store(true, Ordering::Relaxed);
             return Err(RecordError::Stopped);
         }
-        let start = Instant::now();
         if let Some(log) = &mut self.log {
             log.done(t, row).map_err(RecordError::fatal)?;
         }
-        shares.writing.add(start);
         Ok(())
     }
 }

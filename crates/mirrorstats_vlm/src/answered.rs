@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::journal::{Journal, JournalError};
 use super::model::{Memory, Vlm, tokens};
-use mirrorstats_agents::spend::Spend;
+use crate::limits::Spend;
 
 /// The average answer of finished episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

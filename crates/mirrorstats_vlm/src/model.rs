@@ -14,8 +14,8 @@ use super::limits::Account;
 use super::models::Choice;
 use super::provider::{Provider, Unreachable};
 use super::wire_format::ModelAnswer;
+use crate::limits::Spend;
 use mirrorstats_agents::reply::Ending;
-use mirrorstats_agents::spend::Spend;
 use mirrorstats_agents::{Lost, locked};
 
 #[derive(Clone, Debug, PartialEq, Eq)]

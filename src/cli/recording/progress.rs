@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
+use super::player::AnyPlayer;
 use super::{spent, unreadable};
-use mirrorstats_agents::Player;
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_exact::format::fixed;
 use mirrorstats_experiment::Experiment;
@@ -53,7 +53,7 @@ fn time_left(left: Duration) -> String {
 /// whose replies are unreadable.
 pub(crate) struct Bar<'a> {
     line: ProgressBar,
-    player: &'a dyn Player,
+    player: &'a AnyPlayer,
     subject: &'a Subject,
     episodes: usize,
     /// The steps of all episodes at most.
@@ -69,7 +69,7 @@ pub(crate) struct Bar<'a> {
 }
 
 impl<'a> Bar<'a> {
-    pub(crate) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
+    pub(crate) fn new(player: &'a AnyPlayer, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
         let steps_of = |key: &Key| u64::from(world.of(&key.experiment).episode.steps);
         let budget: BTreeMap<Experiment, u64> =
             todo.iter().map(|key| (key.experiment.clone(), steps_of(key))).collect();
@@ -124,7 +124,7 @@ impl<'a> Bar<'a> {
     }
 
     fn has_news(&self) -> bool {
-        self.player.waits() || self.replies.counts().all_unreadable() > 0
+        self.player.player().waits() || self.replies.counts().all_unreadable() > 0
     }
 
     fn write_line(&self) {

@@ -9,13 +9,13 @@ use tokio::runtime::Runtime;
 
 use crate::cli::{Failure, output};
 use mirrorstats_agents::secrets::Secret;
-use mirrorstats_agents::spend::Spend;
 use mirrorstats_agents::{Agent, Lost, Player, Task};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_experiment::Spec;
 use mirrorstats_record::plan::slug;
 use mirrorstats_trace::episodes::model_id::OWN_SERVER;
 use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Spend;
 use mirrorstats_vlm::limits::{Account, Limits};
 use mirrorstats_vlm::models::{Choice, Models, ModelsError};
 use mirrorstats_vlm::probe::{ProbeAnswer, probe};
@@ -219,11 +219,15 @@ fn effort(text: &str) -> Result<Effort, String> {
 /// A model as a player.
 pub struct VlmPlayer {
     pub vlm: Arc<Vlm>,
-    in_flight: usize,
+    pub(super) in_flight: usize,
     network: Option<Runtime>,
 }
 
 impl VlmPlayer {
+    pub(super) fn spend(&self) -> Option<Spend> {
+        self.network.as_ref().map(|_| self.vlm.spend())
+    }
+
     fn of_journals(vlm: Arc<Vlm>, in_flight: usize) -> Self {
         Self { vlm, in_flight, network: None }
     }
@@ -245,26 +249,6 @@ impl Player for VlmPlayer {
 
     fn waits(&self) -> bool {
         self.network.is_some()
-    }
-
-    fn in_flight(&self) -> usize {
-        self.in_flight
-    }
-
-    fn resumes(&self) {
-        self.vlm.note_answered();
-    }
-
-    fn keeps_steps(&self) -> bool {
-        true
-    }
-
-    fn spend(&self) -> Option<Spend> {
-        self.network.as_ref().map(|_| self.vlm.spend())
-    }
-
-    fn check(&self) -> Result<(), String> {
-        self.vlm.connect().map_err(|fault| fault.to_string())
     }
 
     fn stopped(&self) -> Option<String> {

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use mirrorstats_agents::secrets::Secret;
-use mirrorstats_agents::spend::Spend;
 use mirrorstats_agents::{Agent as _, Lost, Observation, Reply, Task};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::spec::Stated;
 use mirrorstats_trace::episodes::frame::Frame;
 use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Spend;
 use mirrorstats_vlm::limits::{Account, Limits};
 use mirrorstats_vlm::models::{Backend, Choice, Contract, Model, Prices};
 use mirrorstats_vlm::provider::{Patience, Provider};

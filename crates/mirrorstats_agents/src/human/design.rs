@@ -4,8 +4,16 @@
 
 use indexmap::IndexMap;
 
-use crate::Planned;
 use mirrorstats_exact::names;
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Planned {
+    pub episode_id: String,
+    pub experiment: String,
+    pub seed: i32,
+    pub repetition: i32,
+    pub is_recorded: bool,
+}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Design {
@@ -93,8 +101,7 @@ fn latin_row(n: usize, row: usize) -> Vec<usize> {
 mod tests {
     use std::collections::BTreeMap;
 
-    use super::{Design, Order, Schedule, latin_row};
-    use crate::Planned;
+    use super::{Design, Order, Planned, Schedule, latin_row};
 
     fn planned(seeds: i32, repeats: i32) -> Vec<Planned> {
         let episode = |seed, repetition| Planned {

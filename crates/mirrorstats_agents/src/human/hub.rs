@@ -13,10 +13,10 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tokio::sync::oneshot;
 
-use super::design::{Design, Schedule};
+use super::design::{Design, Planned, Schedule};
 use super::journal::{Leaving, ParticipantJournal, PlayedStep};
 use super::seat::{End, Given, LISTENING, OpenQuestion, PlayerQuestion, Seat, Terms};
-use crate::{Planned, Turn, locked};
+use crate::{Turn, locked};
 
 /// Removes the episodes of a code from a folder; returns their ids.
 pub type Eraser = fn(&Path, &str) -> Result<BTreeSet<String>, String>;
@@ -63,7 +63,7 @@ impl Hub {
         Self { terms, schedule, seats, tokens, answers, journal, eraser, owners, deleted, is_stopping }
     }
 
-    pub(crate) fn seats(&self) -> usize {
+    pub fn seats(&self) -> usize {
         self.seats.len()
     }
 
@@ -76,7 +76,7 @@ impl Hub {
     }
 
     /// Deals the episodes: begun ones to their players, those of people who left to others if the design permits.
-    pub(super) fn deal(&self, planned: &[Planned]) {
+    pub fn deal(&self, planned: &[Planned]) {
         let begun_by = |id: &str| (0..self.seats()).find(|seat| self.has_begun(*seat, id));
         let mut left_over = Vec::new();
         for (at, lane) in self.schedule.lanes(planned, self.seats()).into_iter().enumerate() {
@@ -119,7 +119,7 @@ impl Hub {
         }
     }
 
-    pub(super) fn turn(&self, episode_id: &str) -> Turn {
+    pub fn turn(&self, episode_id: &str) -> Turn {
         let Some(seat) = locked(&self.owners).get(episode_id).copied() else { return Turn::Never };
         let seat = self.seat(seat);
         let is_next = seat.episode.is_none() && seat.lane.front().is_some_and(|next| next == episode_id);
@@ -183,7 +183,8 @@ impl Hub {
         self.is_stopping.load(Ordering::Relaxed)
     }
 
-    pub(super) fn interrupt(&self) {
+    /// Ends all waiting for people, since the recording is to stop.
+    pub fn interrupt(&self) {
         self.is_stopping.store(true, Ordering::Relaxed);
         (0..self.seats()).for_each(|seat| self.seat(seat).asked = None);
     }

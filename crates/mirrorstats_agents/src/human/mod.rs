@@ -17,7 +17,6 @@ pub mod journal;
 pub mod seat;
 pub mod server;
 
-use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
@@ -28,7 +27,7 @@ use self::seat::{Given, PlayerQuestion};
 use self::server::Server;
 use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
-use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Planned, Player, Reply, Task, Turn, Usage, locked};
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Task, Usage, locked};
 use mirrorstats_exact::hash;
 
 const PROTOCOL: u32 = 3;
@@ -47,6 +46,15 @@ impl Human {
     pub fn new(model: &str, hub: Arc<Hub>, server: Option<Server>) -> Self {
         let consent = hub.terms.consent.as_deref().map(|words| hash::of_bytes(words.as_bytes()));
         Self { model: model.to_owned(), consent, hub, server: Mutex::new(server) }
+    }
+
+    pub fn hub(&self) -> &Hub {
+        &self.hub
+    }
+
+    pub fn end(&self, is_complete: bool) {
+        self.hub.end(is_complete);
+        drop(locked(&self.server).take());
     }
 }
 
@@ -92,39 +100,6 @@ impl Player for Human {
 
     fn waits(&self) -> bool {
         true
-    }
-
-    fn in_flight(&self) -> usize {
-        self.hub.seats()
-    }
-
-    fn most_in_flight(&self) -> usize {
-        self.hub.seats()
-    }
-
-    fn plans(&self, planned: &[Planned]) {
-        self.hub.deal(planned);
-    }
-
-    fn turn(&self, episode_id: &str) -> Turn {
-        self.hub.turn(episode_id)
-    }
-
-    fn keeps_steps(&self) -> bool {
-        true
-    }
-
-    fn interrupt(&self) {
-        self.hub.interrupt();
-    }
-
-    fn deleted(&self) -> Result<BTreeSet<String>, String> {
-        self.hub.delete_due()
-    }
-
-    fn ended(&self, is_complete: bool) {
-        self.hub.end(is_complete);
-        drop(locked(&self.server).take());
     }
 }
 

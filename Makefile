@@ -29,7 +29,7 @@ lint:
 # As most people build it.
 check-default:
 	cargo clippy --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats_view \
-		--all-targets -- -D warnings
+		--exclude mirrorstats_sim --exclude mirrorstats_record --exclude mirrorstats_vlm --all-targets -- -D warnings
 
 # What the tests need, each script says what it cannot get.
 needed:

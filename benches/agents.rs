@@ -18,21 +18,20 @@ use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use mirrorstats_agents::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Turn, Usage, Words};
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::lock::FolderLock;
+use mirrorstats_record::metadata;
+use mirrorstats_record::plan::{Key, Plan, Shard, Subject};
+use mirrorstats_record::run::{Progress, Recording, Settings};
+use mirrorstats_record::store::Store;
+use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::{Action, Step};
-use mirrorstats_world::agent::vlm::Vlm;
-use mirrorstats_world::agent::vlm::limits::Account;
-use mirrorstats_world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
-use mirrorstats_world::agent::vlm::provider::{Patience, Provider};
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
-use mirrorstats_world::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
-use mirrorstats_world::record::lock::FolderLock;
-use mirrorstats_world::record::metadata;
-use mirrorstats_world::record::plan::{Key, Plan, Shard, Subject};
-use mirrorstats_world::record::run::{Progress, Recording, Settings};
-use mirrorstats_world::record::shares::{Shares, Spent};
-use mirrorstats_world::record::store::Store;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Account;
+use mirrorstats_vlm::models::{Backend, Choice, Contract, Model, Prices};
+use mirrorstats_vlm::provider::{Patience, Provider};
+use mirrorstats_vlm::wire_format::Dialect;
 use tokio::runtime::Runtime;
 
 const IN_FLIGHT: usize = 64;
@@ -53,7 +52,7 @@ impl Agent for AtOnce {
             self_color: None,
             selected_cube: None,
             mark_report: None,
-            answers: mirrorstats_world::agent::Answers::new(),
+            answers: mirrorstats_agents::Answers::new(),
             words: Words::default(),
             raw: Some(REPLY.to_owned()),
             usage: Usage::default(),
@@ -188,8 +187,8 @@ impl Progress for Quiet {
     }
 }
 
-/// Steps per second of a recording, and where its time went.
-fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> (f64, Spent) {
+/// Steps per second of a recording.
+fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> f64 {
     let subject = Subject::of(player.model());
     let store = Store::new(
         FolderLock::take(&folder.join("runs")).unwrap(),
@@ -198,25 +197,17 @@ fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: No
     );
     let plan = Plan { experiments: vec![Experiment::E5], seeds: 1, runs: 64, repeats: 1, shard: Shard::WHOLE };
     let keys: Vec<Key> = plan.keys();
-    let (shares, stop) = (Shares::default(), AtomicBool::new(false));
+    let stop = AtomicBool::new(false);
     let in_flight = NonZeroUsize::new(IN_FLIGHT).unwrap();
     let settings = Settings { threads, in_flight, frames: true, log: true, max_unusable: None };
     let (store, subject) = (&store, &subject);
     let recording =
-        Recording { config, player, subject, store, progress: &Quiet, stop: &stop, shares: &shares, settings };
+        Recording { config, player, turn: &|_| Turn::Now, subject, store, progress: &Quiet, stop: &stop, settings };
     let start = Instant::now();
     let tally = recording.run(&keys).unwrap();
     #[expect(clippy::cast_precision_loss, reason = "some thousand steps")]
-    let rate = tally.steps as f64 / start.elapsed().as_secs_f64();
-    (rate, shares.spent())
-}
-
-fn print(name: &str, (rate, spent): (f64, Spent)) {
-    let parts = [spent.rendering, spent.visibility, spent.writing, spent.agent].map(|part| part.as_secs_f64());
-    let [rendering, visibility, writing, agent] = parts.map(|part| 100.0 * part / parts.iter().sum::<f64>());
-    println!(
-        "  {name:<20} {rate:6.1} steps/s   (rendering {rendering:.0} %, census {visibility:.0} %, writing {writing:.0} %, agents and waiting {agent:.0} %)"
-    );
+    let steps = tally.steps as f64;
+    steps / start.elapsed().as_secs_f64()
 }
 
 fn main() {
@@ -233,12 +224,12 @@ fn main() {
         let folder = tempfile::tempdir().expect("there is a place for temporary files");
         println!("frames of {width} x {height}");
         let alone = measure(&config, &AtOnce, folder.path(), threads);
-        print("answers at once", alone);
+        println!("  answers at once      {alone:6.1} steps/s");
         let waiting = measure(&config, &Behind::new(folder.path()), folder.path(), threads);
-        print("answers in a second", waiting);
+        println!("  answers in a second  {waiting:6.1} steps/s");
         #[expect(clippy::cast_precision_loss, reason = "some dozens")]
         let answered = IN_FLIGHT as f64 / ANSWER_TAKES.as_secs_f64();
-        let ideal = answered.min(alone.0);
-        println!("  {:.1} % of {ideal:.1} steps/s, which answers and frames allow", 100.0 * waiting.0 / ideal);
+        let ideal = answered.min(alone);
+        println!("  {:.1} % of {ideal:.1} steps/s, which answers and frames allow", 100.0 * waiting / ideal);
     }
 }

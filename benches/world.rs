@@ -7,12 +7,12 @@ use std::num::NonZeroUsize;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use mirrorstats_experiment::Experiment;
+use mirrorstats_sim::camera::Camera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::scene::Scene;
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::camera::Camera;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::scene::Scene;
-use mirrorstats_world::sim::world::World;
 
 const EPISODES: i32 = 4;
 const STEPS: i32 = 100;

@@ -2,11 +2,11 @@
 
 use std::fs;
 
-use mirrorstats_world::agent::Status;
-use mirrorstats_world::agent::reply::{self, Ending};
-use mirrorstats_world::agent::vlm::journal::{Entry, Journal, Recorded};
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
-use mirrorstats_world::experiment::Experiment;
+use mirrorstats_agents::Status;
+use mirrorstats_agents::reply::{self, Ending};
+use mirrorstats_experiment::Experiment;
+use mirrorstats_vlm::journal::{Entry, Journal, Recorded};
+use mirrorstats_vlm::wire_format::Dialect;
 
 use crate::depth::reached;
 use crate::scratch;

@@ -15,9 +15,9 @@ use mirrorstats_report::plan::{Given, PlanRequest, plan};
 use mirrorstats_score::format::{self, Format};
 use mirrorstats_score::score_traces;
 use mirrorstats_score::vocabulary;
+use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_statistics::sample_size::Clusters;
-use mirrorstats_world::agent::vlm::journal::Entry;
-use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_vlm::journal::Entry;
 use serde_json::{Value, json};
 
 use crate::{episodes, pages, pairs, scratch, traces};

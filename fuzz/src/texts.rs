@@ -4,6 +4,8 @@ use std::fs;
 use std::io;
 use std::sync::LazyLock;
 
+use mirrorstats_experiment::file;
+use mirrorstats_experiment::spec::Spec;
 use mirrorstats_metric::catalogs::catalog::Catalog;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_report::bundle::{Manifest, check_old};
@@ -11,11 +13,9 @@ use mirrorstats_report::plan::register::RegisteredPlan;
 use mirrorstats_report::style::Style;
 use mirrorstats_score::format::{self, Format, Partition};
 use mirrorstats_score::vocabulary;
+use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_toml_spec::Source;
 use mirrorstats_trace::beside::lost;
-use mirrorstats_world::experiment::file;
-use mirrorstats_world::experiment::spec::Spec;
-use mirrorstats_world::sim::config::WorldConfig;
 
 use crate::depth::reached;
 use crate::{episodes, scratch};

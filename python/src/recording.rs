@@ -6,12 +6,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
+use mirrorstats::cli::commands::record::{AnyPlayer, RecordArgs, Recorded};
 use mirrorstats::cli::{self, Failure, Options};
-use mirrorstats_world::agent::Player;
-use mirrorstats_world::agent::exec::Images;
-use mirrorstats_world::agent::function::{Function, FunctionPlayer, Listener};
-use mirrorstats_world::record::lock::{FolderLock, parts_of};
+use mirrorstats_agents::exec::Images;
+use mirrorstats_agents::function::{Function, FunctionPlayer, Listener};
+use mirrorstats_record::lock::{FolderLock, parts_of};
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
@@ -49,7 +48,7 @@ impl Ending {
 }
 
 impl PythonAgent {
-    fn player(self, args: &RecordArgs, ending: &Ending) -> Arc<dyn Player> {
+    fn player(self, args: &RecordArgs, ending: &Ending) -> AnyPlayer {
         let Self { model, source, is_base64, is_lost, listeners } = self;
         let images = if is_base64 { Images::Base64 } else { Images::Path };
         let (scratch, stop, ending) = (parts_of(args.out()), Arc::clone(&ending.stop), ending.clone());
@@ -66,7 +65,8 @@ impl PythonAgent {
                 Ok(listener(function, failed.clone()))
             })
         };
-        Arc::new(FunctionPlayer::new(Function { model, source, images, scratch, listeners: Arc::new(listeners), stop }))
+        let function = Function { model, source, images, scratch, listeners: Arc::new(listeners), stop };
+        AnyPlayer::Other(Box::new(FunctionPlayer::new(function)))
     }
 }
 
@@ -105,7 +105,7 @@ pub fn record(py: Python<'_>, options: &str, agent: Option<PythonAgent>) -> PyRe
         Some(agent) => agent.player(&args, &ending),
         None => py.detach(|| args.player().map_err(failed))?,
     };
-    let recorded = py.detach(|| until_ended(&args, lock, player.as_ref(), &ending))?;
+    let recorded = py.detach(|| until_ended(&args, lock, &player, &ending))?;
     if let Some(raised) = ending.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
         return Err(raised);
     }
@@ -121,7 +121,7 @@ pub fn record(py: Python<'_>, options: &str, agent: Option<PythonAgent>) -> PyRe
 fn until_ended(
     args: &RecordArgs,
     lock: FolderLock,
-    player: &dyn Player,
+    player: &AnyPlayer,
     ending: &Ending,
 ) -> PyResult<Result<Recorded, Box<Failure>>> {
     let (done, ended) = channel();
@@ -142,7 +142,7 @@ fn until_ended(
             }
             if let Err(signal) = signals() {
                 if ending.stop.load(Ordering::Relaxed) {
-                    player.abandon();
+                    player.player().abandon();
                 }
                 ending.raise(signal);
                 player.interrupt();

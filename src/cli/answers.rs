@@ -35,7 +35,7 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
     schemas.extend([
         ("record", printed_schema::<super::recording::RecordAnswer>()),
         ("record-forecast", json!(schema_for!(super::recording::dry_run::ForecastAnswer))),
-        ("record-probe", json!(schema_for!(mirrorstats_world::agent::vlm::probe::ProbeAnswer))),
+        ("record-probe", json!(schema_for!(mirrorstats_vlm::probe::ProbeAnswer))),
     ]);
     schemas
 }

@@ -6,10 +6,10 @@ use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::record::plan::Key;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::plan::Key;
+use mirrorstats_sim::config::WorldConfig;
 
 use crate::profile::{Profiles, chance_interval};
 use crate::recorded::{record_all, record_in, score};

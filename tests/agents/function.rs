@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex};
 
 use mirrorstats::cli;
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
-use mirrorstats_world::agent::exec::Images;
-use mirrorstats_world::agent::exec::message::Message;
-use mirrorstats_world::agent::function::{Function, FunctionPlayer, Listener};
+use mirrorstats_agents::exec::Images;
+use mirrorstats_agents::exec::message::Message;
+use mirrorstats_agents::function::{Function, FunctionPlayer, Listener};
 use serde_json::Value;
 
 use crate::harness::files::write_small_world;

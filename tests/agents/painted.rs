@@ -5,13 +5,13 @@
 
 use std::sync::Arc;
 
+use mirrorstats_agents::perception::camera::{Heading, Place, Viewpoint};
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_agents::{Observation, Reply, Task};
+use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
 use mirrorstats_trace::episodes::frame::Frame;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::agent::perception::camera::{Heading, Place, Viewpoint};
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::agent::{Observation, Reply, Task};
-use mirrorstats_world::experiment::Experiment;
 
 const HALF: f64 = 4.0;
 const CEILING: f64 = 2.8;
@@ -132,7 +132,7 @@ pub fn pose(x: f64, y: f64, yaw: f64) -> Viewpoint {
 }
 
 fn moved(pose: Viewpoint, action: Action) -> Viewpoint {
-    mirrorstats_world::agent::scripted::route::after(pose, action, STEP)
+    mirrorstats_agents::scripted::route::after(pose, action, STEP)
 }
 
 fn along(from: Point, ray: Point, far: f64) -> Point {

@@ -3,16 +3,16 @@
 use std::fs;
 use std::sync::Arc;
 
+use mirrorstats_agents::prompt::{self, Prompt};
+use mirrorstats_agents::{Observation, Past, Task};
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::file;
+use mirrorstats_record::plan::Key;
+use mirrorstats_record::rollout;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::scene::Scene;
 use mirrorstats_trace::episodes::episode::Action;
 use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_world::agent::prompt::{self, Prompt};
-use mirrorstats_world::agent::{Observation, Past, Task};
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::experiment::file;
-use mirrorstats_world::record::plan::Key;
-use mirrorstats_world::record::rollout;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::scene::Scene;
 
 fn task(experiment: Experiment, stated_color: Option<&str>) -> Task {
     Task { experiment, stated_color: stated_color.map(str::to_owned), step_budget: 100, seed: 1 }

@@ -5,19 +5,18 @@ use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_experiment::spec::Body;
+use mirrorstats_record::plan::{Key, Subject};
+use mirrorstats_record::rollout::{EpisodeStage, Nobody, head, play, task};
 use mirrorstats_score::score_traces::{self, Request};
 use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_sim::camera::Camera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::scene::Scene;
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::write::OptionalColumns;
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::experiment::spec::Body;
-use mirrorstats_world::record::plan::{Key, Subject};
-use mirrorstats_world::record::rollout::{EpisodeStage, Nobody, head, play, task};
-use mirrorstats_world::record::shares::Shares;
-use mirrorstats_world::sim::camera::Camera;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::scene::Scene;
-use mirrorstats_world::sim::world::World;
 
 use crate::harness::need;
 use crate::harness::traces::{open, write_trace};
@@ -29,7 +28,7 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
     let mut player = agent.agent(&task(config, &scene, key));
     let episode = head(config, &scene, key, &Subject::of(agent.name()));
     let mut world = World::new(config, scene).unwrap();
-    let stage = EpisodeStage { config, eye, looks: true, stop: &AtomicBool::new(false), shares: &Shares::default() };
+    let stage = EpisodeStage { config, eye, looks: true, stop: &AtomicBool::new(false) };
     ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
 }
 

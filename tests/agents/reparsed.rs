@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_experiment::{Experiment, Spec};
 use mirrorstats_trace::episodes::episode::{Action, Extra, Step};
 use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
-use mirrorstats_world::experiment::{Experiment, Spec};
 use serde_json::{Value, json};
 
 use crate::harness::program::run;

@@ -1,10 +1,10 @@
 //! Replies as models write them, and how each is read.
 
+use mirrorstats_agents::reply::{self, Ending, Repair};
+use mirrorstats_agents::{Reply, Status};
+use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
 use mirrorstats_trace::episodes::identification::normal_form;
-use mirrorstats_world::agent::reply::{self, Ending, Repair};
-use mirrorstats_world::agent::{Reply, Status};
-use mirrorstats_world::experiment::Experiment;
 
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 
@@ -356,7 +356,7 @@ fn an_ending_counts_before_the_text() {
 #[test]
 fn the_raw_text_is_kept_whatever_it_is() {
     let raw = "no JSON at all";
-    let reply = read(raw).with_text(raw.to_owned(), mirrorstats_world::agent::Usage::default());
+    let reply = read(raw).with_text(raw.to_owned(), mirrorstats_agents::Usage::default());
     assert_eq!((reply.status, reply.raw.as_deref()), (Status::ParseFailed, Some(raw)));
 }
 

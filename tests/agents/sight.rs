@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
+use mirrorstats_agents::Observation;
+use mirrorstats_agents::perception::View;
+use mirrorstats_agents::perception::camera::{Place, Viewpoint};
+use mirrorstats_agents::scripted::knowledge::Knowledge;
+use mirrorstats_agents::scripted::room::WallSide;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::agent::Observation;
-use mirrorstats_world::agent::perception::View;
-use mirrorstats_world::agent::perception::camera::{Place, Viewpoint};
-use mirrorstats_world::agent::scripted::knowledge::Knowledge;
-use mirrorstats_world::agent::scripted::room::WallSide;
 
 use crate::painted::{Painted, pose};
 

@@ -1,11 +1,11 @@
 //! Whole episodes in painted rooms.
 
+use mirrorstats_agents::perception::camera::{Place, Viewpoint};
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_agents::{Reply, Task};
+use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::agent::perception::camera::{Place, Viewpoint};
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::agent::{Reply, Task};
-use mirrorstats_world::experiment::Experiment;
 
 use crate::painted::{Painted, pose, task};
 

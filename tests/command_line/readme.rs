@@ -166,8 +166,7 @@ fn lasting(output: &str) -> String {
     let output = &progress.replace_all(output, "");
     let took = Regex::new(r"in [0-9.]+ m?s( \([^)]*\))?").unwrap();
     let output = &Regex::new(r"\b[1-9A-HJ-NP-Za-km-z]{22}\b").unwrap().replace_all(output, "[an id]");
-    let shares = Regex::new(r"(?m)^time: .*$").unwrap();
-    shares.replace_all(&took.replace_all(output, "in [a time]"), "time: [shares]").into_owned()
+    took.replace_all(output, "in [a time]").into_owned()
 }
 
 #[test]

@@ -74,7 +74,7 @@ pub fn python() -> &'static str {
 /// Checks that pictures can be drawn without a display.
 #[cfg(feature = "sim")]
 pub fn drawing() {
-    use mirrorstats_world::sim::{camera::Camera, config::WorldConfig};
+    use mirrorstats_sim::{camera::Camera, config::WorldConfig};
     static FAULT: OnceLock<Option<String>> = OnceLock::new();
     if let Some(fault) = FAULT.get_or_init(|| Camera::new(&WorldConfig::default()).err().map(|error| error.to_string()))
     {

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use mirrorstats_world::record::lock::FolderLock;
+use mirrorstats_record::lock::FolderLock;
 
 #[test]
 fn a_folder_has_one_owner_and_is_left_as_it_was() {

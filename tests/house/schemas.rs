@@ -4,6 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use mirrorstats::cli::printed_schema;
+use mirrorstats_agents::reply;
+use mirrorstats_experiment::Experiment;
 use mirrorstats_log::message::{Decision, EpisodeMessage};
 use mirrorstats_metric::logical_plan::explain::Explanation;
 use mirrorstats_metric::shape::DefinitionFile;
@@ -26,8 +28,6 @@ use mirrorstats_trace::info::Info;
 use mirrorstats_trace::schema::describe::SchemaDocument;
 use mirrorstats_trace::validate::Validation;
 use mirrorstats_trace::write::seal::SealAnswer;
-use mirrorstats_world::agent::reply;
-use mirrorstats_world::experiment::Experiment;
 use schemars::schema_for;
 use serde_json::{Value, json};
 
@@ -68,14 +68,14 @@ fn current() -> Vec<(&'static str, Value)> {
     schemas.extend(mirrorstats::cli::schemas());
     #[cfg(feature = "sim")]
     schemas.extend([
-        ("participants-remove", json!(schema_for!(mirrorstats_world::record::participants::Removed))),
-        ("census", json!(schema_for!(mirrorstats_world::sim::visibility::Visibility))),
-        ("replay", json!(schema_for!(mirrorstats_world::replay::verify::ReplayAnswer))),
-        ("exec-message", json!(schema_for!(mirrorstats_world::agent::exec::message::Message))),
-        ("models", json!(schema_for!(mirrorstats_world::agent::vlm::models::Models))),
-        ("lost", json!(schema_for!(mirrorstats_world::record::failures::LostEpisode))),
-        ("scene", json!(schema_for!(mirrorstats_world::sim::scene::Scene))),
-        ("world-config", json!(schema_for!(mirrorstats_world::sim::config::WorldConfig))),
+        ("participants-remove", json!(schema_for!(mirrorstats_record::participants::Removed))),
+        ("census", json!(schema_for!(mirrorstats_sim::visibility::Visibility))),
+        ("replay", json!(schema_for!(mirrorstats_record::replay::verify::ReplayAnswer))),
+        ("exec-message", json!(schema_for!(mirrorstats_agents::exec::message::Message))),
+        ("models", json!(schema_for!(mirrorstats_vlm::models::Models))),
+        ("lost", json!(schema_for!(mirrorstats_record::failures::LostEpisode))),
+        ("scene", json!(schema_for!(mirrorstats_sim::scene::Scene))),
+        ("world-config", json!(schema_for!(mirrorstats_sim::config::WorldConfig))),
     ]);
     schemas
 }

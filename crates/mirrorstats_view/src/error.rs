@@ -28,7 +28,7 @@ pub enum ViewError {
     Folder { folder: PathBuf, source: io::Error },
     #[cfg(feature = "sim")]
     #[error("no frames: {0}")]
-    Replay(#[from] Box<mirrorstats_world::replay::error::ReplayError>),
+    Replay(#[from] Box<mirrorstats_record::replay::error::ReplayError>),
     #[error("{0}")]
     Absent(String),
     #[error("{0}")]

@@ -6,8 +6,8 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::Value;
 
 use super::ViewError;
+use mirrorstats_record::replay::frames::frames;
 use mirrorstats_trace::episodes::episode::Episode;
-use mirrorstats_world::replay::frames::frames;
 
 /// The number of steps rendered together from one world.
 const TOGETHER: usize = 16;

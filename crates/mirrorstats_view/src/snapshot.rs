@@ -246,7 +246,7 @@ impl Snapshot {
     pub fn renders(&self, opened: &Opened) -> bool {
         let is_whole = self.scored.is_some() && opened.running.is_none();
         #[cfg(feature = "sim")]
-        let has_world = mirrorstats_world::replay::frames::is_recipe(self.recording(opened).as_ref());
+        let has_world = mirrorstats_record::replay::frames::is_recipe(self.recording(opened).as_ref());
         #[cfg(not(feature = "sim"))]
         let has_world = false;
         is_whole && has_world

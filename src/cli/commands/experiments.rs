@@ -9,9 +9,9 @@ use serde::Serialize;
 use crate::cli::{Failure, Outcome, experiments, output};
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_exact::suggest::hint;
-use mirrorstats_world::experiment::explain::explained;
-use mirrorstats_world::experiment::file::Loaded;
-use mirrorstats_world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
+use mirrorstats_experiment::explain::explained;
+use mirrorstats_experiment::file::Loaded;
+use mirrorstats_experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
 
 /// Check, explain and show experiments
 #[derive(Clone, Debug, clap::Args)]
@@ -71,12 +71,23 @@ impl ExperimentsArgs {
 
 #[cfg(feature = "sim")]
 fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
-    experiments::placed(file, &mirrorstats_world::sim::config::WorldConfig::default())
+    experiments::placed(file, &mirrorstats_sim::config::WorldConfig::default())
 }
 
 #[cfg(not(feature = "sim"))]
 fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
     experiments::load(file)
+}
+
+/// The occlusion in scenes of the built-in world.
+#[cfg(feature = "sim")]
+fn occlusion(experiment: &Experiment) -> Option<String> {
+    mirrorstats_sim::placement::Occlusion::described(&mirrorstats_sim::config::WorldConfig::default(), experiment)
+}
+
+#[cfg(not(feature = "sim"))]
+const fn occlusion(_: &Experiment) -> Option<String> {
+    None
 }
 
 fn check(file: &Path, json: bool) -> Result<Outcome, Failure> {
@@ -109,7 +120,7 @@ fn explain(path: &Path, prompt: bool, json: bool) -> Result<Outcome, Failure> {
     if json {
         return answer(experiments.iter());
     }
-    let words = if prompt { prompt_of } else { explained };
+    let words = |experiment| if prompt { prompt_of(experiment) } else { explained(experiment, occlusion(experiment)) };
     let texts: Vec<String> = experiments.iter().map(words).collect();
     output::plain(texts.join("\n") + "\n")
 }

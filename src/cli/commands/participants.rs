@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
-use mirrorstats_world::record::participants::{self, Removed};
+use mirrorstats_record::participants::{self, Removed};
 
 /// Remove people from a recording
 #[derive(Clone, Debug, clap::Args)]

@@ -9,9 +9,9 @@ use crate::cli::recording::dollars;
 use crate::cli::vlm::VlmPlayer;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
-use mirrorstats_world::agent::vlm::{Typical, Vlm, estimate};
-use mirrorstats_world::record::plan::{Key, Subject};
-use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_record::plan::{Key, Subject};
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_vlm::{Typical, Vlm, estimate};
 
 /// The expected tokens of a reply without hidden reasoning, before any reply: the paper's keys with a sentence each.
 const PRIOR_REPLY: u64 = 250;

@@ -3,11 +3,14 @@
 use std::collections::BTreeSet;
 
 use crate::cli::Failure;
-use mirrorstats_world::agent::Planned;
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::record::error::StoreError;
-use mirrorstats_world::record::index::Place;
-use mirrorstats_world::record::plan::{Key, Plan, Subject};
+#[cfg(feature = "view")]
+use mirrorstats_agents::human::design::Planned;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::error::StoreError;
+use mirrorstats_record::index::Place;
+#[cfg(feature = "view")]
+use mirrorstats_record::plan::Subject;
+use mirrorstats_record::plan::{Key, Plan};
 
 pub struct Episodes {
     pub planned: Vec<Key>,
@@ -35,7 +38,8 @@ impl Episodes {
         self.planned.iter().filter(|key| !todo.contains(key)).cloned().collect()
     }
 
-    /// All planned episodes, in the form for players.
+    /// All planned episodes, in the form for people.
+    #[cfg(feature = "view")]
     pub fn to_play(&self, subject: &Subject) -> Vec<Planned> {
         let todo: BTreeSet<&Key> = self.todo.iter().collect();
         let one = |key: &Key| Planned {

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::cli::Failure;
-use mirrorstats_world::agent::exec::{Exec, ExecSettings, Images};
-use mirrorstats_world::record::lock::parts_of;
+use mirrorstats_agents::exec::{Exec, ExecSettings, Images};
+use mirrorstats_record::lock::parts_of;
 
 /// The folder inside a recording's folder for the standard error of programs.
 const STANDARD_ERROR: &str = "stderr";

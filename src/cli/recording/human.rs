@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::cli::{Failure, output};
+use mirrorstats_agents::human::Human;
+use mirrorstats_agents::human::design::{Design, Order, Schedule};
+use mirrorstats_agents::human::hub::{Eraser, Hub};
+use mirrorstats_agents::human::journal::ParticipantJournal;
+use mirrorstats_agents::human::seat::Terms;
+use mirrorstats_agents::human::server::{self, Server};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::input;
+use mirrorstats_record::participants::remove_episodes;
+use mirrorstats_record::plan::Plan;
 use mirrorstats_web::{self, Guard};
-use mirrorstats_world::agent::human::Human;
-use mirrorstats_world::agent::human::design::{Design, Order, Schedule};
-use mirrorstats_world::agent::human::hub::{Eraser, Hub};
-use mirrorstats_world::agent::human::journal::ParticipantJournal;
-use mirrorstats_world::agent::human::seat::Terms;
-use mirrorstats_world::agent::human::server::{self, Server};
-use mirrorstats_world::record::participants::remove_episodes;
-use mirrorstats_world::record::plan::Plan;
 
 /// The limit for the text of consent, which people read.
 const LONGEST_CONSENT: Limit = Limit::new("bytes of the words of consent", 1 << 20);

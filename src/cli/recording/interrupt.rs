@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::player::AnyPlayer;
 use crate::cli::Failure;
-use mirrorstats_world::agent::Player;
 
-pub type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
+pub type Playing = Arc<Mutex<Option<Arc<AnyPlayer>>>>;
 
 /// The first Ctrl-C ends a recording after the current steps, or at once for people; a second one ends everything at
 /// once.
@@ -15,7 +15,7 @@ pub fn stop_at_interrupt(stop: &'static AtomicBool, playing: Playing) -> Result<
         let is_second = stop.swap(true, Ordering::Relaxed);
         let playing = playing.lock().unwrap_or_else(PoisonError::into_inner);
         match playing.as_ref() {
-            Some(player) if is_second => player.abandon(),
+            Some(player) if is_second => player.player().abandon(),
             Some(player) => player.interrupt(),
             None => {}
         }

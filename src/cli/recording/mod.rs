@@ -6,6 +6,7 @@ pub mod exec;
 #[cfg(feature = "view")]
 pub mod human;
 pub mod interrupt;
+pub mod player;
 pub mod probe;
 pub mod progress;
 pub mod registration;
@@ -24,14 +25,13 @@ use crate::cli::scoring::commands;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_exact::number::Decimal;
+use mirrorstats_record::failures::LostEpisode;
+use mirrorstats_record::replies::{RepliesAnswer, UnreadableReply};
 use mirrorstats_report::html;
 use mirrorstats_study::{Study, StudyError};
 use mirrorstats_trace::footers::renderer::Renderer;
 use mirrorstats_trace::validate::replies::ReplyCounts;
-use mirrorstats_world::agent::vlm::limits::Spend;
-use mirrorstats_world::record::failures::LostEpisode;
-use mirrorstats_world::record::replies::{RepliesAnswer, UnreadableReply};
-use mirrorstats_world::record::shares::Spent;
+use mirrorstats_vlm::limits::Spend;
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -75,7 +75,6 @@ pub struct Recorded {
     pub gave_up: Option<String>,
     pub(crate) lost_list: PathBuf,
     pub(crate) elapsed: Duration,
-    pub(crate) times: Spent,
     /// The steps of unfinished episodes that the next start plays again, since the agent keeps no journal.
     pub(crate) forgotten: u64,
 }
@@ -111,7 +110,7 @@ pub(crate) fn dollars(value: f64) -> String {
 
 /// Prints the outcome of a recording into `folder`; `files` are those of its experiments.
 pub(crate) fn say(recorded: &Recorded, folder: &Path, files: &[&Path]) -> io::Result<()> {
-    let Recorded { answer, lost_list, elapsed, times, .. } = recorded;
+    let Recorded { answer, lost_list, elapsed, .. } = recorded;
     let mut out = io::stderr().lock();
     let seconds = elapsed.as_secs_f64();
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
@@ -135,9 +134,6 @@ pub(crate) fn say(recorded: &Recorded, folder: &Path, files: &[&Path]) -> io::Re
     if let Some(words) = unreadable(&answer.replies.counts) {
         let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, UnreadableReply::words);
         writeln!(out, "{words}; first: {first}")?;
-    }
-    if let Some(shares) = shares(*times) {
-        writeln!(out, "time: {shares}")?;
     }
     match answer.renderers.as_slice() {
         [] => {}
@@ -203,25 +199,10 @@ fn stopped(answer: &RecordAnswer) -> Option<String> {
     }
 }
 
-fn shares(times: Spent) -> Option<String> {
-    let parts = [
-        ("rendering", times.rendering),
-        ("world and census", times.visibility),
-        ("agents and waiting for them", times.agent),
-        ("writing", times.writing),
-    ];
-    let total: f64 = parts.iter().map(|(_, time)| time.as_secs_f64()).sum();
-    let words = parts.map(|(name, time)| format!("{name} {} %", fixed(Some(100.0 * time.as_secs_f64() / total), 0)));
-    (total > 0.0).then(|| words.join(", "))
-}
-
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
-    use super::{dollars, shares, spent};
-    use mirrorstats_world::agent::vlm::limits::Spend;
-    use mirrorstats_world::record::shares::Spent;
+    use super::{dollars, spent};
+    use mirrorstats_vlm::limits::Spend;
 
     #[test]
     fn unknown_costs_are_printed_as_unknown() {
@@ -236,18 +217,5 @@ mod tests {
             "; 1 request without an answer may have been paid: at most 0.2500 US dollars, as far as prices are known";
         assert_eq!(spent(&killed), spent(&spend) + words);
         assert_eq!([dollars(0.0), dollars(0.00123)], ["0.00 US dollars", "0.0012 US dollars"]);
-    }
-
-    #[test]
-    fn times_print_as_shares_of_their_sum() {
-        let spent = Spent {
-            rendering: Duration::from_secs(7),
-            visibility: Duration::from_secs(2),
-            agent: Duration::ZERO,
-            writing: Duration::from_secs(1),
-        };
-        let expected = "rendering 70 %, world and census 20 %, agents and waiting for them 0 %, writing 10 %";
-        assert_eq!(shares(spent).as_deref(), Some(expected));
-        assert_eq!(shares(Spent::default()), None);
     }
 }

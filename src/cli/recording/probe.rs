@@ -5,8 +5,8 @@ use std::io;
 use crate::cli::recording::dollars;
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_exact::format::counted;
-use mirrorstats_world::agent::vlm::probe::{ProbeAnswer, ProbedParameter};
-use mirrorstats_world::agent::vlm::provider::rate_limit::RateLimit;
+use mirrorstats_vlm::probe::{ProbeAnswer, ProbedParameter};
+use mirrorstats_vlm::provider::rate_limit::RateLimit;
 
 pub(crate) fn tell(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result<()> {
     let (model, id) = (visible(&answer.model), visible(&answer.id));

@@ -9,16 +9,16 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
+use super::player::AnyPlayer;
 use super::{spent, unreadable};
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_exact::format::fixed;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::plan::{Key, Subject};
+use mirrorstats_record::replies::{Replies, RepliesAnswer};
+use mirrorstats_record::run::Progress;
+use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::Step;
-use mirrorstats_world::agent::Player;
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::record::plan::{Key, Subject};
-use mirrorstats_world::record::replies::{Replies, RepliesAnswer};
-use mirrorstats_world::record::run::Progress;
-use mirrorstats_world::sim::config::WorldConfig;
 
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
@@ -53,7 +53,7 @@ fn time_left(left: Duration) -> String {
 /// whose replies are unreadable.
 pub(crate) struct Bar<'a> {
     line: ProgressBar,
-    player: &'a dyn Player,
+    player: &'a AnyPlayer,
     subject: &'a Subject,
     episodes: usize,
     /// The steps of all episodes at most.
@@ -69,7 +69,7 @@ pub(crate) struct Bar<'a> {
 }
 
 impl<'a> Bar<'a> {
-    pub(crate) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
+    pub(crate) fn new(player: &'a AnyPlayer, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
         let steps_of = |key: &Key| u64::from(world.of(&key.experiment).episode.steps);
         let budget: BTreeMap<Experiment, u64> =
             todo.iter().map(|key| (key.experiment.clone(), steps_of(key))).collect();
@@ -124,7 +124,7 @@ impl<'a> Bar<'a> {
     }
 
     fn has_news(&self) -> bool {
-        self.player.waits() || self.replies.counts().all_unreadable() > 0
+        self.player.player().waits() || self.replies.counts().all_unreadable() > 0
     }
 
     fn write_line(&self) {
@@ -185,13 +185,13 @@ mod tests {
     use std::time::Duration;
 
     use super::{Bar, rate, time_left};
+    use mirrorstats_agents::scripted::Scripted;
+    use mirrorstats_agents::{Player, exec};
+    use mirrorstats_experiment::Experiment;
+    use mirrorstats_record::plan::{Key, Subject};
+    use mirrorstats_record::run::Progress as _;
+    use mirrorstats_sim::config::WorldConfig;
     use mirrorstats_trace::episodes::episode::{Extra, Step};
-    use mirrorstats_world::agent::scripted::Scripted;
-    use mirrorstats_world::agent::{Player, exec};
-    use mirrorstats_world::experiment::Experiment;
-    use mirrorstats_world::record::plan::{Key, Subject};
-    use mirrorstats_world::record::run::Progress as _;
-    use mirrorstats_world::sim::config::WorldConfig;
 
     #[test]
     fn the_progress_counts_unreadable_replies() {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use crate::cli::Failure;
 use crate::cli::scoring::read_plan;
+use mirrorstats_agents::prompt;
 use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::footers::declared::Registration;
-use mirrorstats_world::agent::prompt;
-use mirrorstats_world::sim::config::WorldConfig;
 
 /// The name of the world among the experiments of a plan.
 pub(crate) const WORLD: &str = "world";

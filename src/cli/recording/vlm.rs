@@ -8,18 +8,19 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use crate::cli::{Failure, output};
+use mirrorstats_agents::secrets::Secret;
+use mirrorstats_agents::{Agent, Lost, Player, Task};
 use mirrorstats_exact::escape::visible;
+use mirrorstats_experiment::Spec;
+use mirrorstats_record::plan::slug;
 use mirrorstats_trace::footers::model_id::OWN_SERVER;
-use mirrorstats_world::agent::vlm::Vlm;
-use mirrorstats_world::agent::vlm::limits::{Account, Limits, Spend};
-use mirrorstats_world::agent::vlm::models::{Choice, Models, ModelsError};
-use mirrorstats_world::agent::vlm::probe::{ProbeAnswer, probe};
-use mirrorstats_world::agent::vlm::provider::{Patience, Provider, check_transport};
-use mirrorstats_world::agent::vlm::secrets::Secret;
-use mirrorstats_world::agent::vlm::wire_format::{Dialect, Effort};
-use mirrorstats_world::agent::{Agent, Lost, Player, Task};
-use mirrorstats_world::experiment::Spec;
-use mirrorstats_world::record::plan::slug;
+use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Spend;
+use mirrorstats_vlm::limits::{Account, Limits};
+use mirrorstats_vlm::models::{Choice, Models, ModelsError};
+use mirrorstats_vlm::probe::{ProbeAnswer, probe};
+use mirrorstats_vlm::provider::{Patience, Provider, check_transport};
+use mirrorstats_vlm::wire_format::{Dialect, Effort};
 
 /// A service tier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -218,11 +219,15 @@ fn effort(text: &str) -> Result<Effort, String> {
 /// A model as a player.
 pub struct VlmPlayer {
     pub vlm: Arc<Vlm>,
-    in_flight: usize,
+    pub(super) in_flight: usize,
     network: Option<Runtime>,
 }
 
 impl VlmPlayer {
+    pub(super) fn spend(&self) -> Option<Spend> {
+        self.network.as_ref().map(|_| self.vlm.spend())
+    }
+
     fn of_journals(vlm: Arc<Vlm>, in_flight: usize) -> Self {
         Self { vlm, in_flight, network: None }
     }
@@ -244,26 +249,6 @@ impl Player for VlmPlayer {
 
     fn waits(&self) -> bool {
         self.network.is_some()
-    }
-
-    fn in_flight(&self) -> usize {
-        self.in_flight
-    }
-
-    fn resumes(&self) {
-        self.vlm.note_answered();
-    }
-
-    fn keeps_steps(&self) -> bool {
-        true
-    }
-
-    fn spend(&self) -> Option<Spend> {
-        self.network.as_ref().map(|_| self.vlm.spend())
-    }
-
-    fn check(&self) -> Result<(), String> {
-        self.vlm.connect().map_err(|fault| fault.to_string())
     }
 
     fn stopped(&self) -> Option<String> {

@@ -6,13 +6,13 @@ use std::path::Path;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
 use crate::cli::Failure;
-use mirrorstats_world::experiment::file::{self, FileError, Loaded};
+use mirrorstats_experiment::file::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
 use {
+    mirrorstats_experiment::Experiment,
+    mirrorstats_record::plan::{Experiments, Named},
+    mirrorstats_sim::{config::WorldConfig, placement},
     mirrorstats_toml_spec::{Fault, Faults},
-    mirrorstats_world::experiment::Experiment,
-    mirrorstats_world::record::plan::{Experiments, Named},
-    mirrorstats_world::sim::{config::WorldConfig, placement},
 };
 
 /// Parses typed experiments; a file name may have any bytes.

@@ -1,7 +1,7 @@
 //! The behaviour of each scripted agent in the battery, as its module predicts.
 
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::sim::Experiment;
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_experiment::Experiment;
 
 use super::{chance_interval, episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum};

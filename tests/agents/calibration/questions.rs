@@ -14,8 +14,8 @@
 //! | which one was I? | `contingency-late`, 4 steps | TSA 1/2 or more: others of its colour confuse the test of lags | as before | as oracle | 1/3 | 0 |
 //! | am I there at all? | `contingency-swap` | WARRANTED 3/4 or more, INVENTED 1/4 or less | INVENTED 3/4 or more | INVENTED 3/4 or more | INVENTED 1 | 0, 0 |
 
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::sim::Experiment;
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_experiment::Experiment;
 
 use super::{episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum, chance_interval};

@@ -1,7 +1,7 @@
 //! The behaviour of each scripted agent with a hand and a mark, as its module predicts.
 
-use mirrorstats_world::agent::scripted::Scripted;
-use mirrorstats_world::sim::Experiment;
+use mirrorstats_agents::scripted::Scripted;
+use mirrorstats_experiment::Experiment;
 
 use super::{episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum};

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use base64::Engine as _;
-use mirrorstats_world::agent::exec::message::Message;
-use mirrorstats_world::agent::reply;
-use mirrorstats_world::experiment::Experiment;
+use mirrorstats_agents::exec::message::Message;
+use mirrorstats_agents::reply;
+use mirrorstats_experiment::Experiment;
 use schemars::schema_for;
 use serde_json::Value;
 

@@ -1,7 +1,7 @@
 //! A model behind a server on loopback, from the command line: the spending is reported, and a failing server loses an
 //! episode under the failure's name.
 
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::Value;
 
 use super::recordings::{Bench, FORWARD, done, outcome};
@@ -36,7 +36,6 @@ fn spending_is_printed_over_all_starts() {
     assert_eq!((code, &answer["recorded"], &answer["steps"]), (Some(0), &1.into(), &3.into()), "{said}");
     assert_eq!((&answer["spend"]["requests"], &answer["spend"]["tokens"]), (&4.into(), &3300.into()));
     assert!(!bench.path("runs/lost.jsonl").exists());
-    assert!(said.contains("time: rendering"), "{said}");
 
     // A cassette costs nothing.
     let played = ["--cassette", "runs/journal", "--out", "again"];

@@ -4,16 +4,17 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
+use mirrorstats_agents::secrets::Secret;
+use mirrorstats_agents::{Agent as _, Lost, Observation, Reply, Task};
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::spec::Stated;
 use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_world::agent::vlm::Vlm;
-use mirrorstats_world::agent::vlm::limits::{Account, Limits, Spend};
-use mirrorstats_world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
-use mirrorstats_world::agent::vlm::provider::{Patience, Provider};
-use mirrorstats_world::agent::vlm::secrets::Secret;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
-use mirrorstats_world::agent::{Agent as _, Lost, Observation, Reply, Task};
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::experiment::spec::Stated;
+use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Spend;
+use mirrorstats_vlm::limits::{Account, Limits};
+use mirrorstats_vlm::models::{Backend, Choice, Contract, Model, Prices};
+use mirrorstats_vlm::provider::{Patience, Provider};
+use mirrorstats_vlm::wire_format::Dialect;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
 
-use mirrorstats_world::agent::prompt::{Prompt, Rendered};
-use mirrorstats_world::agent::reply;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::wire_format::{Dialect, Effort};
-use mirrorstats_world::experiment::{Experiment, built_in_names};
+use mirrorstats_agents::prompt::{Prompt, Rendered};
+use mirrorstats_agents::reply;
+use mirrorstats_experiment::{Experiment, built_in_names};
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::wire_format::{Dialect, Effort};
 use serde_json::{Value, json};
 
 use super::bench::{Bench, choice, observation, patience, task};

@@ -1,6 +1,6 @@
 //! The fingerprint of an episode includes the model that answers.
 
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::Value;
 
 use super::recordings::Folder;

@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::Dialect;
 
 use super::recordings::{Folder, counting, rows};
 use super::server::{Conduct, Server, whole};

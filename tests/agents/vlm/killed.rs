@@ -7,8 +7,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use mirrorstats_exact::hash;
-use mirrorstats_world::agent::vlm::journal::Entry;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_vlm::journal::Entry;
+use mirrorstats_vlm::wire_format::Dialect;
 
 use super::recordings::{Folder, counting};
 use super::server::{JSON, Request, Server, http, whole};

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use mirrorstats_agents::{Status, reply};
+use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
-use mirrorstats_world::agent::{Status, reply};
-use mirrorstats_world::experiment::Experiment;
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::Value;
 
 use super::bench::{Bench, KEY};

@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use mirrorstats_world::agent::vlm::journal::Entry;
+use mirrorstats_vlm::journal::Entry;
 use serde_json::Value;
 
 use super::bench::KEY;

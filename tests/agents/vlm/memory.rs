@@ -4,10 +4,10 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_world::agent::vlm::Vlm;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::models::Model;
-use mirrorstats_world::agent::vlm::wire_format::{Dialect, Effort};
+use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::models::Model;
+use mirrorstats_vlm::wire_format::{Dialect, Effort};
 
 use super::bench::{Bench, choice};
 use super::server::{Server, decision, http, whole};

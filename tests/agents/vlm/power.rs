@@ -6,8 +6,8 @@ use std::fs;
 use std::process::Stdio;
 
 use mirrorstats_exact::hash;
-use mirrorstats_world::agent::vlm::journal::Entry;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_vlm::journal::Entry;
+use mirrorstats_vlm::wire_format::Dialect;
 
 use super::recordings::{Folder, counting};
 use super::server::{Request, Server, whole};

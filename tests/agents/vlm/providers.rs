@@ -3,11 +3,11 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use mirrorstats_world::agent::Status;
-use mirrorstats_world::agent::reply::Repair;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
-use mirrorstats_world::record::fingerprint::Fingerprint;
+use mirrorstats_agents::Status;
+use mirrorstats_agents::reply::Repair;
+use mirrorstats_record::fingerprint::Fingerprint;
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::{Value, json};
 
 use super::bench::{Bench, KEY, choice, patience};

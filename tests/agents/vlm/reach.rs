@@ -2,9 +2,9 @@
 
 use std::net::TcpListener;
 
-use mirrorstats_world::agent::LostKind;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_agents::LostKind;
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::json;
 
 use super::bench::{Bench, KEY};

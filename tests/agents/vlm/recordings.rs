@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use mirrorstats_world::agent::vlm::journal::Entry;
+use mirrorstats_vlm::journal::Entry;
 use tempfile::TempDir;
 
 use super::bench::KEY;

@@ -2,10 +2,10 @@
 
 use std::fs;
 
-use mirrorstats_world::agent::vlm::Vlm;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
-use mirrorstats_world::agent::{Lost, Reply, Status};
+use mirrorstats_agents::{Lost, Reply, Status};
+use mirrorstats_vlm::Vlm;
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::{Value, json};
 
 use super::bench::{Bench, KEY, choice};

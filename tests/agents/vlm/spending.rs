@@ -3,9 +3,9 @@
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use mirrorstats_world::agent::LostKind;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_agents::LostKind;
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::wire_format::Dialect;
 
 use serde_json::{Value, json};
 

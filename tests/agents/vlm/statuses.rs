@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use mirrorstats_world::agent::Status;
-use mirrorstats_world::agent::reply::Repair;
-use mirrorstats_world::agent::vlm::limits::Limits;
-use mirrorstats_world::agent::vlm::provider::Patience;
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_agents::Status;
+use mirrorstats_agents::reply::Repair;
+use mirrorstats_vlm::limits::Limits;
+use mirrorstats_vlm::provider::Patience;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::json;
 
 use super::bench::{Bench, KEY, patience};

@@ -1,6 +1,6 @@
 //! Unreadable replies are reported when they arrive, at the end, and from the trace.
 
-use mirrorstats_world::agent::vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::Dialect;
 use serde_json::{Value, json};
 
 use super::bench::KEY;

@@ -1,15 +1,15 @@
 //! The agent's own body is never in its own view, and always within its cylinder and the room.
 
-use mirrorstats_world::experiment::spec::Body;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::body::{Figure, Pose, Stride};
-use mirrorstats_world::sim::camera::LabelCamera;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::model::Item;
-use mirrorstats_world::sim::rng::Rng;
-use mirrorstats_world::sim::snapshot::{Shape, Solid};
-use mirrorstats_world::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats_world::sim::world::World;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::spec::Body;
+use mirrorstats_sim::body::{Figure, Pose, Stride};
+use mirrorstats_sim::camera::LabelCamera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::model::Item;
+use mirrorstats_sim::rng::Rng;
+use mirrorstats_sim::snapshot::{Shape, Solid};
+use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats_sim::world::World;
 
 use super::poses::{scatter, shaped, shaped_world, world};
 use crate::harness::need;
@@ -42,7 +42,7 @@ fn never_shows(shape: Body, poses: usize) {
 #[test]
 fn the_check_finds_a_body_in_its_own_view() {
     let config = WorldConfig {
-        eye: mirrorstats_world::sim::config::EyeConfig { forward: 0.0, ..WorldConfig::default().eye },
+        eye: mirrorstats_sim::config::EyeConfig { forward: 0.0, ..WorldConfig::default().eye },
         ..WorldConfig::default()
     };
     let scene = world(Experiment::E1, 4).scene().clone();
@@ -55,7 +55,7 @@ fn the_check_finds_a_body_in_its_own_view() {
 fn the_margin_of_the_eye_is_wide_at_every_stride() {
     // Parts straight below or behind are out of view. What matters is the angle: a part may come no nearer to the edge
     // of the view than half of its distance ahead.
-    let pose = Pose { x: 0.0, y: 0.0, heading: mirrorstats_world::sim::angle::Heading::new(0) };
+    let pose = Pose { x: 0.0, y: 0.0, heading: mirrorstats_experiment::angle::Heading::new(0) };
     let eye = [0.14, 0.0, 1.52];
     for (shape, stride) in shapes_and_strides() {
         let mut world = shaped_world(shape, Experiment::E1, 1);
@@ -75,7 +75,7 @@ fn a_body_is_within_its_cylinder_at_every_stride() {
     for (shape, stride) in shapes_and_strides() {
         let mut world = shaped_world(shape, Experiment::E1, 1);
         for thirties in 0..12 {
-            let pose = Pose { x: 0.0, y: 0.0, heading: mirrorstats_world::sim::angle::Heading::new(thirties) };
+            let pose = Pose { x: 0.0, y: 0.0, heading: mirrorstats_experiment::angle::Heading::new(thirties) };
             world.place(&[Figure { pose, stride, steps: 0 }]);
             for solid in own(&world) {
                 for ([x, y, z], radius) in ends(&solid) {

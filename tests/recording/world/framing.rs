@@ -1,10 +1,10 @@
 //! The size of a reflection by field of view.
 
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::body::{Figure, Pose};
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::scene::Scene;
-use mirrorstats_world::sim::world::World;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_sim::body::{Figure, Pose};
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::scene::Scene;
+use mirrorstats_sim::world::World;
 
 /// Pixels of the own body, 1.6 m in front of the mirror.
 fn own_pixels(fovy: f64) -> f64 {

@@ -1,20 +1,20 @@
 //! Effects of actions, obstacles, and collisions.
 
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::angle::Heading;
+use mirrorstats_sim::body::{Figure, Pose, Stride};
+use mirrorstats_sim::floor::distance;
+use mirrorstats_sim::rng::Rng;
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Action;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::angle::Heading;
-use mirrorstats_world::sim::body::{Figure, Pose, Stride};
-use mirrorstats_world::sim::floor::distance;
-use mirrorstats_world::sim::rng::Rng;
-use mirrorstats_world::sim::world::World;
 
 use super::poses::world;
 
 /// An empty place to walk in: E1 without cubes.
 fn empty() -> World {
     let drawn = world(Experiment::E2, 1);
-    let scene = mirrorstats_world::sim::scene::Scene { cubes: Vec::new(), ..drawn.scene().clone() };
+    let scene = mirrorstats_sim::scene::Scene { cubes: Vec::new(), ..drawn.scene().clone() };
     let mut world = World::new(drawn.config(), scene).unwrap();
     stand(&mut world, [0.0, 0.0], 0);
     world

@@ -1,13 +1,13 @@
 //! The ten colours are distinct from each other and from the room, directly and in the mirror.
 
+use mirrorstats_experiment::Experiment;
+use mirrorstats_sim::camera::Camera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_image::LabelImage;
+use mirrorstats_sim::model::Item;
+use mirrorstats_sim::visibility::{Shown, labels};
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::camera::Camera;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::label_image::LabelImage;
-use mirrorstats_world::sim::model::Item;
-use mirrorstats_world::sim::visibility::{Shown, labels};
-use mirrorstats_world::sim::world::World;
 
 use super::poses::{face_mirror, world};
 use crate::harness::need;

@@ -1,23 +1,23 @@
 //! Visibility through panes of every kind, compared with drawn labels, with MuJoCo's rays, and with what each kind must
 //! show.
 
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::angle::Heading;
+use mirrorstats_experiment::file;
+use mirrorstats_experiment::spec::Body;
+use mirrorstats_sim::body::{Figure, Pose};
+use mirrorstats_sim::camera::{Camera, LabelCamera};
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_image::LabelImage;
+use mirrorstats_sim::model::Item;
+use mirrorstats_sim::passage;
+use mirrorstats_sim::rng::Rng;
+use mirrorstats_sim::scene::{HungPane, Scene};
+use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats_sim::world::World;
 use mirrorstats_toml_spec::Source;
 use mirrorstats_trace::episodes::episode::Action;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::experiment::file;
-use mirrorstats_world::experiment::spec::Body;
-use mirrorstats_world::sim::angle::Heading;
-use mirrorstats_world::sim::body::{Figure, Pose};
-use mirrorstats_world::sim::camera::{Camera, LabelCamera};
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::label_image::LabelImage;
-use mirrorstats_world::sim::model::Item;
-use mirrorstats_world::sim::passage;
-use mirrorstats_world::sim::rng::Rng;
-use mirrorstats_world::sim::scene::{HungPane, Scene};
-use mirrorstats_world::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats_world::sim::world::World;
 
 use super::poses::{scatter, shaped};
 use crate::harness::need;
@@ -266,7 +266,7 @@ fn a_late_mirror_shows_the_past() {
 fn marks_appear_at_their_step_and_later_in_a_late_mirror() {
     let mut world = world(kind("late"), 5);
     let is_shown = |world: &World| {
-        let shown = |stage: &mirrorstats_world::sim::model::Stage| {
+        let shown = |stage: &mirrorstats_sim::model::Stage| {
             stage.items().iter().enumerate().any(|(geom, item)| *item == Item::Mark(0) && stage.is_shown(geom))
         };
         [shown(world.stage()), shown(&world.beyond()[0])]
@@ -304,7 +304,7 @@ fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
     let frame = eye.frame(world).unwrap();
     let pixels = world.labels().codes.iter().enumerate().filter(|(_, code)| **code == shown.code());
     let named =
-        pixels.filter_map(|(at, _)| mirrorstats_world::agent::perception::paint::color(&frame.rgb[3 * at..3 * at + 3]));
+        pixels.filter_map(|(at, _)| mirrorstats_agents::perception::paint::color(&frame.rgb[3 * at..3 * at + 3]));
     let mut counts = std::collections::BTreeMap::new();
     named.for_each(|color| *counts.entry(color).or_insert(0_usize) += 1);
     counts.into_iter().filter(|(_, count)| *count >= 60).max_by_key(|(_, count)| *count).map(|(color, _)| color)

@@ -1,14 +1,14 @@
 //! Worlds with all bodies at random places that do not overlap.
 
-use mirrorstats_world::experiment::spec::Body;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::angle::Heading;
-use mirrorstats_world::sim::body::{Figure, Pose, Stride};
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::floor::{FloorPlan, distance};
-use mirrorstats_world::sim::rng::Rng;
-use mirrorstats_world::sim::scene::Scene;
-use mirrorstats_world::sim::world::World;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::angle::Heading;
+use mirrorstats_experiment::spec::Body;
+use mirrorstats_sim::body::{Figure, Pose, Stride};
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::floor::{FloorPlan, distance};
+use mirrorstats_sim::rng::Rng;
+use mirrorstats_sim::scene::Scene;
+use mirrorstats_sim::world::World;
 
 /// The initial world of an experiment and seed.
 pub fn world(experiment: Experiment, seed: i32) -> World {

@@ -1,15 +1,15 @@
 //! The reaching task: the places of body, camera, mirror, mark and hand, obstacles of the hand, and a mark that only
 //! the mirror shows.
 
+use mirrorstats_experiment::{Experiment, built_in, built_in_names, file};
+use mirrorstats_sim::camera::LabelCamera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::model::Item;
+use mirrorstats_sim::placement;
+use mirrorstats_sim::scene::Scene;
+use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_world::experiment::{Experiment, built_in, built_in_names, file};
-use mirrorstats_world::sim::camera::LabelCamera;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::model::Item;
-use mirrorstats_world::sim::placement;
-use mirrorstats_world::sim::scene::Scene;
-use mirrorstats_world::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats_world::sim::world::World;
 
 use crate::harness::need;
 

@@ -4,16 +4,16 @@ use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use mirrorstats_exact::hash;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_sim::body::{Figure, Pose};
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::floor::distance;
+use mirrorstats_sim::model::Item;
+use mirrorstats_sim::placement::Occlusion;
+use mirrorstats_sim::scene::Scene;
+use mirrorstats_sim::visibility::{Shown, labels};
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::body::{Figure, Pose};
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::floor::distance;
-use mirrorstats_world::sim::model::Item;
-use mirrorstats_world::sim::placement::Occlusion;
-use mirrorstats_world::sim::scene::Scene;
-use mirrorstats_world::sim::visibility::{Shown, labels};
-use mirrorstats_world::sim::world::World;
 
 use crate::assert_shown;
 

@@ -1,14 +1,14 @@
 //! `mirror_visible` by a second caster that shares no code with the first. It reflects each ray at the glass and
 //! follows it through the shapes in a log. The first caster looks from the mirrored eye instead.
 
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::spec::{Body, PaneKind};
+use mirrorstats_sim::model::Item;
+use mirrorstats_sim::rng::Rng;
+use mirrorstats_sim::scene::{HungPane, Scene};
+use mirrorstats_sim::snapshot::{Shape, Snapshot, Solid};
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::experiment::spec::{Body, PaneKind};
-use mirrorstats_world::sim::model::Item;
-use mirrorstats_world::sim::rng::Rng;
-use mirrorstats_world::sim::scene::{HungPane, Scene};
-use mirrorstats_world::sim::snapshot::{Shape, Snapshot, Solid};
-use mirrorstats_world::sim::world::World;
 
 use super::poses::shaped;
 

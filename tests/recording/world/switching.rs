@@ -1,10 +1,10 @@
 //! One eye draws many worlds alternately, and no world affects the next picture.
 
+use mirrorstats_experiment::Experiment;
+use mirrorstats_sim::camera::Camera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::rng::Rng;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::camera::Camera;
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::rng::Rng;
 
 use super::poses::{face_mirror, scatter, world};
 use crate::harness::need;

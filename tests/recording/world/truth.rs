@@ -2,16 +2,16 @@
 
 use std::ops::Range;
 
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::spec::Body;
+use mirrorstats_sim::camera::{Camera, LabelCamera};
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_image::LabelImage;
+use mirrorstats_sim::model::Item;
+use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::frame::Frame;
 use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_world::experiment::spec::Body;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::camera::{Camera, LabelCamera};
-use mirrorstats_world::sim::config::WorldConfig;
-use mirrorstats_world::sim::label_image::LabelImage;
-use mirrorstats_world::sim::model::Item;
-use mirrorstats_world::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats_world::sim::world::World;
 
 use super::poses::{for_scattered, shaped};
 use crate::harness::need;

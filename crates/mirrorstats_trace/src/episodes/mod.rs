@@ -3,4 +3,5 @@ pub mod episode;
 pub mod episode_hash;
 pub mod frame;
 pub mod identification;
+pub mod moments;
 pub mod palette;

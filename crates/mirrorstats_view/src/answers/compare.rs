@@ -8,9 +8,9 @@ use crate::filter::{Query, number, required, value};
 use crate::{Snapshot, ViewError};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::episodes::moments::{Moment, moments};
 use mirrorstats_trace::schema::domain::is_identity;
 use mirrorstats_trace::schema::{COLUMNS, Column, Value as Cell};
-use mirrorstats_world::replay::moments::{Moment, moments};
 
 const MOST_OF_A_SCENE: usize = 60;
 

@@ -14,11 +14,11 @@ use mirrorstats_log::frames::Moment;
 use mirrorstats_score::evidence::{Evidence, MetricEvidence, ranges};
 use mirrorstats_study::{Question, Study};
 use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::episodes::moments::moments;
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::domain::is_identity;
 use mirrorstats_trace::schema::{COLUMNS, Column, Kind, Stored, Value as Cell};
 use mirrorstats_trace::write::merge::Displayed;
-use mirrorstats_world::replay::moments::moments;
 
 /// The maximum number of characters of a text in an answer; the page requests the whole text separately.
 pub(crate) const LONGEST: usize = 4_000;

@@ -4,9 +4,9 @@ use serde_json::{Value, json};
 
 use crate::logs::Opened;
 use mirrorstats_exact::escape::visible;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::spec::Decision;
 use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
-use mirrorstats_world::experiment::Experiment;
-use mirrorstats_world::experiment::spec::Decision;
 
 /// The name of a kind of decision, and the decision at a step.
 type Choice = (&'static str, fn(&Step) -> Option<&str>);

@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
+use mirrorstats_agents::reparse::{Diverged, ReparseAnswer};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace::{Content, TemporaryFolder, folder_of};
@@ -17,7 +18,6 @@ use mirrorstats_report::changes::Limit;
 use mirrorstats_report::tables::Table;
 use mirrorstats_study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored, traces_of};
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_world::replay::reparse::{Diverged, ReparseAnswer};
 
 /// Make a report again from the traces that it was made of, under other definitions or with replies read again
 ///

@@ -7,12 +7,12 @@ use schemars::schema_for;
 use serde_json::{Value, json};
 
 use crate::cli::{Failure, Outcome, terminal};
+use mirrorstats_agents::reply;
+use mirrorstats_experiment::schema::ExperimentFile;
+use mirrorstats_experiment::{Experiment, Spec};
 use mirrorstats_report::tables::Table;
 use mirrorstats_trace::schema::Column;
 use mirrorstats_trace::schema::describe::SchemaDocument;
-use mirrorstats_world::agent::reply;
-use mirrorstats_world::experiment::schema::ExperimentFile;
-use mirrorstats_world::experiment::{Experiment, Spec};
 
 /// Print the trace schema: columns, footer metadata, rules; or a JSON Schema by name
 #[derive(Clone, Copy, Debug, clap::Args)]

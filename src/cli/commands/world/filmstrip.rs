@@ -5,9 +5,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
+use mirrorstats_record::replay::filmstrip::{PngFrame, Reel, Strip};
+use mirrorstats_report::figures::film_strip::{Still, film_strip};
 use mirrorstats_report::figures::{Figure, FigureFormat};
+use mirrorstats_trace::episodes::episode::{Action, Step};
+use mirrorstats_trace::episodes::moments::moments;
 use mirrorstats_trace::inputs;
-use mirrorstats_world::replay::film_strip::{Steps, Strip};
 
 /// Draw one episode as a row of frames: what was done and claimed at each, and when the mirror was in view
 ///
@@ -26,9 +29,6 @@ pub struct FilmstripArgs {
     /// The number of frames
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=20))]
     count: u16,
-    /// These steps instead of chosen ones
-    #[arg(long, value_name = "T,T,..", value_delimiter = ',', conflicts_with = "count")]
-    steps: Option<Vec<i32>>,
 }
 
 impl FilmstripArgs {
@@ -49,22 +49,20 @@ impl FilmstripArgs {
     }
 
     fn figure(&self) -> Result<Figure, Failure> {
-        let chosen = Steps::Chosen(usize::from(self.count));
-        let steps = self.steps.clone().map_or(chosen, Steps::Named);
-        let strip = Strip { episode: self.episode.clone(), steps };
+        let strip = Strip { episode: self.episode.clone(), count: usize::from(self.count) };
         let (logs, traces) = self.sources()?;
         output::check_target(&self.out, &logs)?;
         let files = if traces.is_empty() { Ok(Vec::new()) } else { inputs::resolve(&traces, io::stdin()) };
         let files = files.map_err(Failure::input)?;
         output::note_stale_checksums(&files);
         output::check_target(&self.out, files.iter().map(|file| &file.path))?;
-        if let Some(figure) = strip.from_logs(&logs, &files)? {
-            return Ok(figure);
+        if let Some(reel) = strip.from_logs(&logs, &files)? {
+            return Ok(draw(&reel));
         }
         if !files.is_empty()
-            && let Some(figure) = strip.from_traces(&files)?
+            && let Some(reel) = strip.from_traces(&files)?
         {
-            return Ok(figure);
+            return Ok(draw(&reel));
         }
         Err(Failure::input(format!(
             "no log or trace in {} has the episode `{}`; `mirrorstats trace info --episodes` lists those of traces",
@@ -92,6 +90,32 @@ impl FilmstripArgs {
         }
         Ok((logs, traces))
     }
+}
+
+fn draw(Reel { episode, frames }: &Reel) -> Figure {
+    let stated = episode.stated_color.as_ref().map_or(String::new(), |color| format!(", told {color}"));
+    let title = format!("{}: body {}{stated}", episode.episode_id, episode.body_color);
+    let moments = moments(episode);
+    let still = |frame: &PngFrame| {
+        let step = episode.steps.get(usize::try_from(frame.t - 1).ok()?)?;
+        let at = moments.iter().filter(|(t, _)| *t == frame.t);
+        Some(still(frame, step, at.map(|(_, moment)| moment.title()).collect()))
+    };
+    film_strip(&title, &frames.iter().filter_map(still).collect::<Vec<_>>())
+}
+
+fn still(PngFrame { t, png, size }: &PngFrame, step: &Step, moments: Vec<&'static str>) -> Still {
+    let action = step.action.map_or("no action", Action::name).replace('_', " ");
+    let action = match step.selected_cube.as_deref() {
+        Some(cube) if cube != "none" => format!("{action}, takes {cube}"),
+        _ => action,
+    };
+    let claim = match (&step.self_color, step.extra.target_distance) {
+        (Some(color), _) => format!("claims {color}"),
+        (None, Some(distance)) => format!("{distance} mm from the mark then"),
+        (None, None) => "no claim".to_owned(),
+    };
+    Still { t: *t, png: png.clone(), size: *size, action, claim, visible: step.mirror_visible, moments }
 }
 
 fn ends_in(path: &Path, ending: &str) -> bool {

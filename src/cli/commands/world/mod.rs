@@ -1,5 +1,7 @@
 //! `mirrorstats world`: the parts of the experiments, without running any.
 
+#[cfg(feature = "raster")]
+mod contact_sheet;
 pub mod filmstrip;
 pub mod record;
 pub mod replay;
@@ -10,11 +12,11 @@ use std::path::PathBuf;
 #[cfg(feature = "raster")]
 use crate::cli::output;
 use crate::cli::{Failure, Outcome, experiments};
-use mirrorstats_world::record::plan::Experiments;
-use mirrorstats_world::sim::config::{ConfigError, WorldConfig};
+use mirrorstats_record::plan::Experiments;
+use mirrorstats_sim::config::{ConfigError, WorldConfig};
 #[cfg(feature = "raster")]
-use mirrorstats_world::sim::contact_sheet;
-use mirrorstats_world::sim::scene::Scene;
+use mirrorstats_sim::contact_sheet::row;
+use mirrorstats_sim::scene::Scene;
 
 /// Replay episodes, draw film strips, show scenes
 #[derive(Clone, Debug, clap::Args)]
@@ -100,7 +102,8 @@ impl WorldArgs {
                 let target = args.out.join("sheet.png");
                 output::check_target(&target, &args.config)?;
                 let experiments = experiments::asked(&args.experiment, &config)?;
-                let png = contact_sheet::png(&config, &experiments, args.seed).map_err(Failure::input)?;
+                let rows = experiments.iter().map(|experiment| row(&config, experiment, args.seed));
+                let png = contact_sheet::png(&rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?)?;
                 output::make_folder(&args.out)?;
                 output::write_file(&target, &png)?;
             }

@@ -18,27 +18,26 @@ use crate::cli::human::HumanArgs;
 pub use crate::cli::recording::Recorded;
 use crate::cli::recording::episodes::Episodes;
 use crate::cli::recording::interrupt::{Playing, stop_at_interrupt};
+pub use crate::cli::recording::player::AnyPlayer;
 use crate::cli::recording::progress::Bar;
 use crate::cli::recording::{self, RecordAnswer, probe, several};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use crate::cli::{Failure, Outcome, experiments, options_of, output};
+use mirrorstats_agents::scripted::{Renamed, Scripted};
 use mirrorstats_exact::budget::{Budget, Limit};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::suggest::hint;
-use mirrorstats_world::agent::Player;
-use mirrorstats_world::agent::scripted::{Renamed, Scripted};
-use mirrorstats_world::agent::vlm::probe::ProbeAnswer;
-use mirrorstats_world::record::failures::LostEpisode;
-use mirrorstats_world::record::index::RecordingIndex;
-use mirrorstats_world::record::lock::FolderLock;
-use mirrorstats_world::record::metadata::Recordings;
-use mirrorstats_world::record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
-use mirrorstats_world::record::run::{Recording, Settings, Tally};
-use mirrorstats_world::record::shares::Shares;
-use mirrorstats_world::record::store::Store;
-use mirrorstats_world::sim::Experiment;
-use mirrorstats_world::sim::config::WorldConfig;
+use mirrorstats_experiment::Experiment;
+use mirrorstats_record::failures::LostEpisode;
+use mirrorstats_record::index::RecordingIndex;
+use mirrorstats_record::lock::FolderLock;
+use mirrorstats_record::metadata::Recordings;
+use mirrorstats_record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
+use mirrorstats_record::run::{Recording, Settings, Tally};
+use mirrorstats_record::store::Store;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_vlm::probe::ProbeAnswer;
 
 const HUMAN: &str = "human";
 
@@ -182,9 +181,9 @@ impl RecordArgs {
 
     fn record_one(&self, playing: &Playing, stop: &AtomicBool) -> Result<Recorded, Failure> {
         let lock = self.lock()?;
-        let player = self.player()?;
+        let player = Arc::new(self.player()?);
         *playing.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&player));
-        let recorded = self.record(lock, player.as_ref(), stop)?;
+        let recorded = self.record(lock, &player, stop)?;
         recording::say(&recorded, &self.out, &self.files())?;
         Ok(recorded)
     }
@@ -232,27 +231,27 @@ impl RecordArgs {
     }
 
     /// The player that `--agent` names.
-    pub fn player(&self) -> Result<Arc<dyn Player>, Failure> {
+    pub fn player(&self) -> Result<AnyPlayer, Failure> {
         self.player_who(true)
     }
 
     /// The same, but people are not asked to play unless `plays` is set.
     #[cfg_attr(not(feature = "view"), expect(unused_variables, reason = "people play with the feature alone"))]
-    fn player_who(&self, plays: bool) -> Result<Arc<dyn Player>, Failure> {
+    fn player_who(&self, plays: bool) -> Result<AnyPlayer, Failure> {
         if let Some(command) = self.agent.strip_prefix("exec:") {
-            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
+            return Ok(AnyPlayer::Other(Box::new(self.exec.player(command, self.vlm.name(), &self.out)?)));
         }
         match self.agent.as_str() {
-            "vlm" => Ok(Arc::new(self.vlm.player(&self.out, self.in_flight)?)),
+            "vlm" => Ok(AnyPlayer::Model(self.vlm.player(&self.out, self.in_flight)?)),
             #[cfg(feature = "view")]
             HUMAN => {
                 let each = (self.seeds, self.repeats);
-                Ok(Arc::new(self.human.player(self.vlm.name(), each, &self.out, plays)?))
+                Ok(AnyPlayer::People(self.human.player(self.vlm.name(), each, &self.out, plays)?))
             }
             name => {
                 let script = scripted(name)?;
                 let model = self.vlm.name().unwrap_or_else(|| script.name()).to_owned();
-                Ok(Arc::new(Renamed { script, model }))
+                Ok(AnyPlayer::Other(Box::new(Renamed { script, model })))
             }
         }
     }
@@ -288,19 +287,22 @@ impl RecordArgs {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
         all.spend(plan.size()).map_err(Failure::input)?;
-        let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
-        let player = match &vlm {
-            Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
-            None => self.player_who(false)?,
+        let player = match self.agent.as_str() {
+            "vlm" => AnyPlayer::Model(self.vlm.forecaster(&self.out)?),
+            _ => self.player_who(false)?,
         };
-        let subject = self.subject(player.as_ref());
-        let recording = self.recordings(config, plan, player.as_ref())?;
+        let subject = self.subject(&player);
+        let recording = self.recordings(config, plan, &player)?;
         let there = RecordingIndex::new(&self.out, subject.clone(), recording);
         let episodes = Episodes::of(plan, |experiment| there.recorded(experiment))?;
-        let limits = (self.settings(player.as_ref()).in_flight.get(), self.vlm.requests_per_minute);
-        let vlm = vlm.filter(|_| self.vlm.sends());
-        let requests =
-            vlm.map(|vlm| RequestForecast::of(&vlm, &subject, (&episodes.found(), &episodes.todo), config, limits));
+        let limits = (self.settings(&player).in_flight.get(), self.vlm.requests_per_minute);
+        let requests = match &player {
+            AnyPlayer::Model(model) if self.vlm.sends() => {
+                let episodes = (episodes.found(), episodes.todo.as_slice());
+                Some(RequestForecast::of(model, &subject, (&episodes.0, episodes.1), config, limits))
+            }
+            _ => None,
+        };
         let requests = requests.transpose().map_err(Failure::input)?;
         Ok(ForecastAnswer::of(&subject, episodes.planned.len(), &episodes.todo, config, requests))
     }
@@ -311,7 +313,7 @@ impl RecordArgs {
     }
 
     /// Records with this player, whatever `--agent` names, until the end or until `stop` is set. Reports only progress.
-    pub fn record(&self, lock: FolderLock, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
+    pub fn record(&self, lock: FolderLock, player: &AnyPlayer, stop: &AtomicBool) -> Result<Recorded, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
         let subject = &self.subject(player);
@@ -319,24 +321,29 @@ impl RecordArgs {
         let store = &Store::new(lock, subject.clone(), recording);
         let episodes = Episodes::of(plan, |experiment| store.recorded(experiment))?;
         let Episodes { planned, todo } = &episodes;
-        if todo.len() < planned.len() {
-            player.resumes();
+        if let AnyPlayer::Model(model) = player {
+            if todo.len() < planned.len() {
+                model.vlm.note_answered();
+            }
+            if !todo.is_empty() {
+                model.vlm.connect().map_err(Failure::input)?;
+            }
         }
-        if !todo.is_empty() {
-            player.check().map_err(Failure::input)?;
+        #[cfg(feature = "view")]
+        if let AnyPlayer::People(people) = player {
+            people.hub().deal(&episodes.to_play(subject));
         }
-        player.plans(&episodes.to_play(subject));
         let bar = Bar::new(player, subject, todo, config);
-        let shares = Shares::default();
         let start = Instant::now();
         let (progress, settings) = (&bar, self.settings(player));
-        let recording = Recording { config, player, subject, store, progress, stop, shares: &shares, settings };
-        let outcome = recording.run(todo);
+        let turn = &|id: &str| player.turn(id);
+        let outcome =
+            Recording { config, player: player.player(), turn, subject, store, progress, stop, settings }.run(todo);
         // Complete episodes are assembled, however the recording ended.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(experiment));
         let deleted = player.deleted();
         bar.clear();
-        player.ended(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
+        player.end(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
         let tally = outcome.map_err(Failure::input)?;
         assembled.map_err(Failure::input)?;
         let deleted = deleted.map_err(Failure::input)?;
@@ -347,7 +354,7 @@ impl RecordArgs {
         let lost: Vec<LostEpisode> = lost.into_iter().map(|(_, lost)| lost).collect();
         store.note_lost(&[found.as_slice(), &recorded].concat(), &lost).map_err(Failure::input)?;
         let answer = RecordAnswer {
-            model: player.model().to_owned(),
+            model: player.player().model().to_owned(),
             asked: planned.len(),
             found: found.len(),
             recorded: recorded.len(),
@@ -362,28 +369,28 @@ impl RecordArgs {
             traces: files(plan, |experiment| store.trace(experiment)),
             logs: files(plan, |experiment| store.log(experiment)),
         };
-        let gave_up = player.stopped().or_else(|| given_up.map(|given_up| given_up.to_string()));
+        let gave_up = player.player().stopped().or_else(|| given_up.map(|given_up| given_up.to_string()));
         let forgotten = if stopped && !player.keeps_steps() { bar.steps().saturating_sub(steps) } else { 0 };
-        let (lost_list, elapsed, times) = (store.lost_list(), start.elapsed(), shares.spent());
-        Ok(Recorded { answer, gave_up, lost_list, elapsed, times, forgotten })
+        Ok(Recorded { answer, gave_up, lost_list: store.lost_list(), elapsed: start.elapsed(), forgotten })
     }
 
-    fn recordings(&self, config: &WorldConfig, plan: &Plan, player: &dyn Player) -> Result<Recordings, Failure> {
+    fn recordings(&self, config: &WorldConfig, plan: &Plan, player: &AnyPlayer) -> Result<Recordings, Failure> {
         let registered = self.plan.as_deref().map(|file| registration(file, config)).transpose()?;
-        Ok(Recordings::new(&plan.experiments, config, player, self.condition.as_deref(), registered.as_ref()))
+        Ok(Recordings::new(&plan.experiments, config, player.player(), self.condition.as_deref(), registered.as_ref()))
     }
 
-    fn subject(&self, player: &dyn Player) -> Subject {
-        Subject { model: player.model().to_owned(), condition: self.condition.clone() }
+    fn subject(&self, player: &AnyPlayer) -> Subject {
+        Subject { model: player.player().model().to_owned(), condition: self.condition.clone() }
     }
 
-    fn settings(&self, player: &dyn Player) -> Settings {
+    fn settings(&self, player: &AnyPlayer) -> Settings {
         let count = |number| NonZeroUsize::new(number).unwrap_or(NonZeroUsize::MIN);
         let asked = self.in_flight.filter(|_| self.agent != HUMAN);
-        let in_flight = asked.unwrap_or_else(|| count(player.in_flight()).max(self.threads.count()));
+        let (usual, most) = player.in_flight();
+        let in_flight = asked.unwrap_or_else(|| count(usual).max(self.threads.count()));
         Settings {
             threads: self.threads.count(),
-            in_flight: in_flight.min(count(player.most_in_flight())),
+            in_flight: in_flight.min(count(most)),
             frames: !self.no_frames,
             log: !self.no_log,
             max_unusable: (!self.keep_going).then_some(self.max_unusable),

@@ -9,11 +9,11 @@ use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace::{self, is_same_file};
 use mirrorstats_log::read::{episode_hashes, other_episode};
+use mirrorstats_record::replay::again::MOST_RAYS;
+use mirrorstats_record::replay::error::{Divergence, ReplayError};
+use mirrorstats_record::replay::verify::{FramesAnswer, Outputs, RecordedTrace, Recount, ReplayAnswer, frame_path};
 use mirrorstats_trace::footers::renderer::Renderer;
 use mirrorstats_trace::inputs;
-use mirrorstats_world::replay::again::MOST_RAYS;
-use mirrorstats_world::replay::error::{Divergence, ReplayError};
-use mirrorstats_world::replay::verify::{FramesAnswer, Outputs, RecordedTrace, Recount, ReplayAnswer, frame_path};
 
 /// Replay a trace's episodes in their recorded worlds, and compare every step with the recording
 ///

@@ -1,0 +1,94 @@
+//! The messages to a program or a function in one episode: the words and the frame that a model gets.
+
+use std::path::Path;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
+use super::Images;
+use super::message::{Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
+use crate::prompt::{self, Prompt, Rendered};
+use crate::reply::{self, Ending};
+use crate::{Lost, Observation, Reply, Task, Usage};
+use mirrorstats_exact::replace::TemporaryFolder;
+
+#[derive(Debug)]
+pub(crate) struct Conversation {
+    task: Task,
+    episode_id: String,
+    prompt: Prompt,
+    /// The folder of the frames, if they are files.
+    frames: Option<TemporaryFolder>,
+}
+
+impl Conversation {
+    /// The conversation of an episode; frame files are below `scratch`.
+    pub(crate) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
+        let prompt = Prompt::of(&task.experiment).map_err(Lost::unobservable)?;
+        let frames = match images {
+            Images::Path => {
+                let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, "frames"));
+                Some(made.map_err(Lost::unobservable)?)
+            }
+            Images::Base64 => None,
+        };
+        Ok(Self { task, episode_id: episode_id.to_owned(), prompt, frames })
+    }
+
+    /// The task, only before the first observation, and the observation.
+    pub(crate) fn messages(&self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
+        let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(Lost::unobservable)?;
+        let task = (observation.t == 1).then(|| self.task_message(system));
+        Ok((task, self.observation_message(observation, user)?))
+    }
+
+    fn task_message(&self, system_prompt: String) -> Message {
+        let experiment = self.episode_id.split('/').next().unwrap_or_default().to_owned();
+        Message::Task(TaskMessage {
+            protocol: PROTOCOL,
+            episode_id: self.episode_id.clone(),
+            experiment,
+            family: self.task.experiment.prompt.replace('-', "_"),
+            stated_color: self.task.stated_color.clone(),
+            max_steps: self.task.step_budget,
+            seed: self.task.seed,
+            system_prompt,
+            reply_schema: reply::structure(&self.task.experiment),
+        })
+    }
+
+    fn observation_message(&self, observation: &Observation, user_prompt: String) -> Result<Message, Lost> {
+        let png = observation.frame.to_png().map_err(Lost::unobservable)?;
+        let image = match &self.frames {
+            Some(folder) => Image::Path(kept(folder.path(), observation.t, png)?),
+            None => Image::Base64(STANDARD.encode(png)),
+        };
+        let (last_action, last_thought) = observation.history.clone().unwrap_or_default();
+        Ok(Message::Observation(ObservationMessage {
+            t: observation.t,
+            remaining_steps: observation.remaining,
+            position: Position { x: observation.x, y: observation.y },
+            orientation: observation.yaw,
+            wall_warning: observation.bumped,
+            last_action: last_action.map(|action| prompt::letter(action).to_owned()),
+            last_thought,
+            user_prompt,
+            image,
+        }))
+    }
+
+    pub(crate) fn read(&self, text: String, usage: Usage) -> Reply {
+        reply::read(&text, &self.task.experiment, Ending::Whole).with_text(text, usage)
+    }
+}
+
+/// Writes a frame as a file; returns its path.
+fn kept(folder: &Path, t: i32, png: &[u8]) -> Result<String, Lost> {
+    let path = folder.join(format!("{t:03}.png"));
+    std::fs::write(&path, png).map_err(Lost::unobservable)?;
+    path.into_os_string().into_string().map_err(|_| {
+        Lost::unobservable(
+            "the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file",
+        )
+    })
+}

@@ -1,0 +1,159 @@
+//! The frames of one episode for a film strip, from a log or rendered again from a trace.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::again::Recipe;
+use super::error::ReplayError;
+use super::frames::rendered;
+use mirrorstats_exact::budget::Limit;
+use mirrorstats_log::message::EpisodeMessage;
+use mirrorstats_log::read::{Event, LogReader, png};
+use mirrorstats_log::recover::ended;
+use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::episodes::moments::chosen;
+use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::write::merge::{self, EpisodeRows};
+
+/// The maximum pixels of a frame, 2048 x 2048: a small file may decode to many pixels of four bytes each.
+const LARGEST_FRAME: Limit = Limit::new("pixels in a frame", 1 << 22);
+
+#[derive(Clone, Debug)]
+pub struct Strip {
+    pub episode: String,
+    /// The number of steps, chosen to tell the story.
+    pub count: usize,
+}
+
+/// An episode and the frames of the chosen steps, in order.
+#[derive(Clone, Debug)]
+pub struct Reel {
+    pub episode: Episode,
+    pub frames: Vec<PngFrame>,
+}
+
+#[derive(Clone, Debug)]
+pub struct PngFrame {
+    pub t: i32,
+    pub png: Vec<u8>,
+    pub size: (u32, u32),
+}
+
+impl Strip {
+    pub fn from_logs(&self, logs: &[PathBuf], traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
+        for log in logs {
+            if let Some(reel) = self.in_log(log)? {
+                self.check_traces(&reel.episode, log, traces)?;
+                return Ok(Some(reel));
+            }
+        }
+        Ok(None)
+    }
+
+    fn in_log(&self, path: &Path) -> Result<Option<Reel>, ReplayError> {
+        let (mut head, mut end) = (None, None);
+        let (mut steps, mut frames) = (Vec::new(), BTreeMap::new());
+        for message in LogReader::open(path).map_err(ReplayError::other)? {
+            match message.map_err(ReplayError::other)?.event {
+                Event::Episode(EpisodeMessage::Begin(found)) if found.episode_id == self.episode => head = Some(found),
+                Event::Episode(EpisodeMessage::End { fingerprint, episode_hash, .. }) if head.is_some() => {
+                    end = Some((fingerprint, episode_hash));
+                    break;
+                }
+                Event::Frame(image) if head.is_some() => {
+                    let t = i32::try_from(steps.len() + 1).unwrap_or(i32::MAX);
+                    frames.extend(png(&image).map(|png| (t, png)));
+                }
+                Event::Decision(row) if head.is_some() => steps.push(row.into_step().map_err(ReplayError::other)?),
+                _ => {}
+            }
+        }
+        // A log without frames has the moments but no pictures: the trace renders them again.
+        let Some(head) = head.filter(|_| !frames.is_empty()) else { return Ok(None) };
+        let (fingerprint, hash) = end.unwrap_or_default();
+        match ended(*head, steps, fingerprint, hash) {
+            Ok(episode) => self.reel(episode, frames).map(Some),
+            Err((episode, fault)) => {
+                Err(ReplayError::InLog { log: path.to_owned(), episode: episode.episode_id, fault })
+            }
+        }
+    }
+
+    /// Rejects a trace whose rows of the episode differ from its log's. Unreadable traces are ignored.
+    fn check_traces(&self, episode: &Episode, log: &Path, traces: &[Input]) -> Result<(), ReplayError> {
+        let Some(logged) = &episode.episode_hash else { return Ok(()) };
+        for trace in traces {
+            let Ok(rows) = merge::read(&trace.path) else { continue };
+            let found = rows.iter().find(|rows| rows.episode_id == self.episode);
+            if let Some(traced) = found.and_then(EpisodeRows::stated_hash).filter(|traced| traced != logged) {
+                return Err(ReplayError::apart(&self.episode, (&trace.name, &traced), (log, logged)));
+            }
+        }
+        Ok(())
+    }
+
+    pub fn from_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
+        let set = TraceSet::open(traces).map_err(ReplayError::other)?;
+        let mut undrawable = None;
+        for (input, file) in traces.iter().zip(set.files()) {
+            // All rows are read at once, so a file that cannot be drawn is not read.
+            let recipe = match Recipe::of(&file.recording()) {
+                Ok(recipe) => recipe,
+                Err(error) => {
+                    undrawable.get_or_insert(error);
+                    continue;
+                }
+            };
+            let rows = merge::read(&input.path).map_err(ReplayError::other)?;
+            let Some(found) = rows.iter().find(|rows| rows.episode_id == self.episode) else { continue };
+            return self.rendered(&recipe, found.episode().map_err(ReplayError::other)?).map(Some);
+        }
+        undrawable.map_or(Ok(None), Err)
+    }
+
+    fn rendered(&self, recipe: &Recipe, episode: Episode) -> Result<Reel, ReplayError> {
+        let wanted = chosen(&episode, self.count);
+        let frames = rendered(recipe, &recipe.eye, &episode, i32::MAX, |t| wanted.contains(&t))?;
+        self.reel(episode, frames)
+    }
+
+    fn reel(&self, episode: Episode, mut frames: BTreeMap<i32, Vec<u8>>) -> Result<Reel, ReplayError> {
+        let frame = |t| match frames.remove(&t) {
+            Some(png) => PngFrame::new(t, png),
+            None => Err(ReplayError::NoFrame { episode: self.episode.clone(), t }),
+        };
+        let frames = chosen(&episode, self.count).into_iter().map(frame).collect::<Result<_, _>>()?;
+        Ok(Reel { episode, frames })
+    }
+}
+
+impl PngFrame {
+    fn new(t: i32, png: Vec<u8>) -> Result<Self, ReplayError> {
+        // Width and height are at fixed offsets behind the signature.
+        let pixels = |at: usize| png.get(at..at + 4).and_then(|bytes| Some(u32::from_be_bytes(bytes.try_into().ok()?)));
+        let (Some(width), Some(height)) = (pixels(16), pixels(20)) else { return Err(ReplayError::NotPng(t)) };
+        LARGEST_FRAME
+            .check(u64::from(width) * u64::from(height))
+            .map_err(|exceeded| ReplayError::Frame(t, exceeded))?;
+        Ok(Self { t, png, size: (width, height) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PngFrame;
+
+    #[test]
+    fn a_frame_is_refused_before_its_pixels_are_made() {
+        let png = |width: u32, height: u32| {
+            let start = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".iter().copied();
+            start.chain(width.to_be_bytes()).chain(height.to_be_bytes()).collect::<Vec<_>>()
+        };
+        assert!(PngFrame::new(1, png(2048, 2048)).is_ok());
+        for (width, height) in [(60_000, 60_000), (2049, 2048), (u32::MAX, u32::MAX)] {
+            let message = PngFrame::new(7, png(width, height)).unwrap_err().to_string();
+            assert!(message.contains("step 7") && message.contains("4194304 pixels in a frame"), "{message}");
+        }
+    }
+}

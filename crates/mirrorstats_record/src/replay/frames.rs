@@ -1,0 +1,72 @@
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+use serde_json::Value;
+
+use super::again::{Recipe, again};
+use super::error::ReplayError;
+use super::verify::{check_rays, rays};
+use mirrorstats_sim::camera::Camera;
+use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_trace::episodes::episode::Episode;
+
+/// The rows of rays for visibility here, where the counts are unused: counting takes most of a replay's time.
+const RAYS: u32 = 24;
+
+/// The end of a replay before its last step.
+enum Halt {
+    Done,
+    Fault(ReplayError),
+}
+
+impl From<ReplayError> for Halt {
+    fn from(error: ReplayError) -> Self {
+        Self::Fault(error)
+    }
+}
+
+/// The frames of these steps as PNG, by t; `recording` is the trace's metadata on its recording.
+pub fn frames(
+    recording: Option<&Value>,
+    episode: &Episode,
+    steps: &RangeInclusive<i32>,
+) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
+    let recipe = Recipe::of(recording.unwrap_or(&Value::Null))?;
+    let mut eye = recipe.eye.clone();
+    let columns = eye.eye.width * RAYS / eye.eye.height_px.max(1);
+    (eye.eye.width, eye.eye.height_px) = (columns.max(1), RAYS);
+    rendered(&recipe, &eye, episode, *steps.end(), |t| steps.contains(&t))
+}
+
+/// Replays an episode up to a step, and returns the wanted frames as PNG, by t.
+pub(super) fn rendered(
+    recipe: &Recipe,
+    eye: &WorldConfig,
+    episode: &Episode,
+    last: i32,
+    is_wanted: impl Fn(i32) -> bool,
+) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
+    check_rays(rays(episode.steps.len(), eye), 0)?;
+    let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
+    let mut frames = BTreeMap::new();
+    let ended = again(recipe, eye, episode, |t, world, _, _| {
+        if t > last {
+            return Err(Halt::Done);
+        }
+        if is_wanted(t) {
+            let frame = camera.frame(world).map_err(ReplayError::other)?;
+            frames.insert(t, frame.to_png().map_err(ReplayError::other)?.to_vec());
+        }
+        Ok(())
+    });
+    match ended {
+        Ok(Some(parted)) => Err(ReplayError::Diverged(parted)),
+        Ok(None) | Err(Halt::Done) => Ok(frames),
+        Err(Halt::Fault(error)) => Err(error),
+    }
+}
+
+/// Returns true if a trace describes its world, and this program can build it.
+pub fn is_recipe(recording: Option<&Value>) -> bool {
+    recording.is_some_and(|recording| Recipe::of(recording).is_ok())
+}

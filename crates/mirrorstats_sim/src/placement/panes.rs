@@ -1,0 +1,203 @@
+//! Mirrors and windows with their places and contents, and the marks on bodies.
+//!
+//! Rule: all of this is drawn from a separate stream after the layout, so experiments that differ only here have the
+//! same layout. The stream depends on the name of their scenes, so shared features are drawn alike.
+
+use super::super::body::Pose;
+use super::super::config::{WorldConfig, metres};
+use super::super::hand::HandRules;
+use super::super::rng::Rng;
+use super::super::scene::{HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, Scene, WornMark, floor_plan};
+use super::{Drawing, is_in_view};
+use mirrorstats_experiment::angle::{HEADINGS, Heading};
+use mirrorstats_experiment::spec::{
+    BodyShown, Hand, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer,
+};
+use mirrorstats_trace::episodes::palette::Color;
+
+/// The maximum number of draws for a pane to be out of view at the start.
+const PLACES: u32 = 40;
+
+/// The maximum number of draws for a hand to be free and at the required distance.
+const STARTS: u32 = 2000;
+
+/// Separates this stream from the layout's.
+const PURPOSE: u64 = 0x7061_6e65_7300;
+
+/// A scene without panes and marks, to which they are added.
+pub(super) struct PaneLayout<'a> {
+    pub config: &'a WorldConfig,
+    pub scene: &'a Scene,
+}
+
+/// The draws in addition to the layout.
+#[derive(Debug, Default)]
+pub(super) struct Extras {
+    pub stated_color: Option<Color>,
+    pub panes: Vec<HungPane>,
+    pub marks: Vec<WornMark>,
+    pub hand: Option<HandStart>,
+}
+
+impl PaneLayout<'_> {
+    pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
+        let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
+        // Separate streams, so that an unused one does not affect the others.
+        let mut marks: Vec<WornMark> = Vec::new();
+        for (at, mark) in (16_u64..).zip(&self.scene.experiment.marks) {
+            marks.extend(self.worn(*mark, &marks, &mut stream(at)));
+        }
+        let hand = self.scene.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
+        let mut others = stream(0);
+        let another = match hand {
+            Some(hand) => self.color_beside(hand, &marks, &mut others),
+            None => self.another_color(&mut others),
+        };
+        let any = self.any_other_color(&mut others);
+        let stated_color = match self.scene.experiment.stated_color {
+            Stated::None => None,
+            Stated::Candidate => Some(another),
+            Stated::Random => Some(any),
+        };
+        let mut panes = Vec::new();
+        for (at, pane) in (1_u64..).zip(&self.scene.experiment.panes) {
+            let mut chance = stream(at);
+            let place = if panes.is_empty() { self.scene.mirror } else { self.place(pane, &panes, &mut chance) };
+            panes.push(self.hung(pane, place, another, &mut chance));
+        }
+        Extras { stated_color, panes, marks, hand }
+    }
+
+    /// A hand in neither the body's nor its mark's colour, which starts on the near side of the mirror, outside the
+    /// body; `None` if no such place has the required distance.
+    fn hand(&self, task: Hand, marks: &[WornMark], chance: &mut Rng) -> Option<HandStart> {
+        let free = self.other_colors(|color| marks.iter().all(|mark| mark.color != color));
+        let palette = &self.scene.experiment.layout.palette;
+        let color = chance.one_of(if free.is_empty() { palette } else { &free });
+        let shape = chance.one_of(&HandShape::ALL);
+        let half_mm = 10 * chance.between(4, 5);
+        let patch = marks.iter().find_map(|mark| mark.patch)?;
+        let draw = |chance: &mut Rng| HandStart {
+            color,
+            shape,
+            half_mm,
+            from_mark: [chance.between(2, 6), chance.between(-5, 5), chance.between(-4, 5)],
+        };
+        let fits = |hand: &HandStart| {
+            let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+            let is_there = HandRules { task, patch, hand: *hand, config: self.config, body: self.scene.start };
+            (task.least..=task.most).contains(&steps) && is_there.is_free(hand.from_mark)
+        };
+        (0..STARTS).map(|_| draw(chance)).find(fits)
+    }
+
+    /// A colour other than those of the body, its mark and the hand, which would be invisible on a body of that colour.
+    fn color_beside(&self, hand: HandStart, marks: &[WornMark], chance: &mut Rng) -> Color {
+        let free = self.other_colors(|color| color != hand.color && marks.iter().all(|mark| mark.color != color));
+        if free.is_empty() { self.any_other_color(chance) } else { chance.one_of(&free) }
+    }
+
+    fn another_color(&self, chance: &mut Rng) -> Color {
+        let colors: Vec<Color> =
+            self.scene.candidates().iter().map(|cube| cube.color).filter(|c| *c != self.scene.body_color).collect();
+        if colors.is_empty() { self.any_other_color(chance) } else { chance.one_of(&colors) }
+    }
+
+    fn any_other_color(&self, chance: &mut Rng) -> Color {
+        chance.one_of(&self.other_colors(|_| true))
+    }
+
+    /// The free colours of the palette, without that of the body.
+    fn other_colors(&self, is_free: impl Fn(Color) -> bool) -> Vec<Color> {
+        let palette = self.scene.experiment.layout.palette.iter().copied();
+        palette.filter(|color| *color != self.scene.body_color && is_free(*color)).collect()
+    }
+
+    fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> MirrorPlace {
+        let first = before[0].place.wall;
+        let fixed = if pane.wall == Wall::Opposite { Some((first + 2) % 4) } else { pane.wall.quarter() };
+        let free: Vec<u8> = (0..4).filter(|wall| before.iter().all(|other| other.place.wall != *wall)).collect();
+        let config = self.config;
+        let width = pane.width_mm.map_or(config.mirror.width, metres);
+        let slack = (config.room.size / 2.0 - width / 2.0 - config.placement.wall_margin).max(0.0);
+        let mut draw = || {
+            let wall = fixed.unwrap_or_else(|| chance.one_of(&free));
+            MirrorPlace { wall, offset: Drawing { config, chance }.length(-slack, slack) }
+        };
+        let last = draw();
+        let unseen = |place: &MirrorPlace| !is_in_view(config, *place, self.scene.start);
+        if unseen(&last) { last } else { (0..PLACES).map(|_| draw()).find(unseen).unwrap_or(last) }
+    }
+
+    fn hung(&self, pane: &Pane, place: MirrorPlace, another: Color, chance: &mut Rng) -> HungPane {
+        let mirror = &self.config.mirror;
+        let room = &self.config.room;
+        let width = pane.width_mm.map_or(mirror.width, metres);
+        let height = pane.height_mm.map_or(mirror.height, metres).min(room.height);
+        // A wide pane moves towards the middle of its wall, a high one to a height where it fits.
+        let slack = (room.size / 2.0 - width / 2.0).max(0.0);
+        let place = MirrorPlace { offset: place.offset.clamp(-slack, slack), ..place };
+        let center_height = pane.bottom_mm.map_or(mirror.center_height, |bottom| metres(bottom) + height / 2.0);
+        let center_height = center_height.clamp(height / 2.0, room.height - height / 2.0);
+        let color = match pane.color {
+            Paint::Own => self.scene.body_color,
+            Paint::Other => another,
+            Paint::Named(color) => color,
+        };
+        let is_independent = pane.kind == PaneKind::Window || pane.body == BodyShown::Independent;
+        HungPane {
+            kind: pane.kind,
+            place,
+            width,
+            height,
+            center_height,
+            delay: pane.delay,
+            paint: (!is_independent && color != self.scene.body_color).then_some(color),
+            double: is_independent.then(|| self.double(pane, place, color, chance)),
+        }
+    }
+
+    /// A walking body, initially in view of an observer before the pane.
+    fn double(&self, pane: &Pane, place: MirrorPlace, color: Color, chance: &mut Rng) -> Other {
+        let [out_x, out_y] = place.heading().direction();
+        // The second room is the first one moved: its opening is in the wall across.
+        let (side, cubes) = if pane.kind == PaneKind::Window { (-1.0, &[][..]) } else { (1.0, &self.scene.cubes[..]) };
+        let plan = floor_plan(self.config, cubes);
+        let half = self.config.room.size / 2.0;
+        let mut draw = || {
+            let away = Drawing { config: self.config, chance }.length(1.2, 2.6);
+            let aside = Drawing { config: self.config, chance }.length(-0.8, 0.8) + place.offset;
+            let depth = side * (half - away);
+            [depth * out_x - aside * out_y, depth * out_y + aside * out_x]
+        };
+        let last = draw();
+        let is_clear = |spot: &[f64; 2]| plan.admits(*spot, 0.05);
+        let spot = if is_clear(&last) { last } else { (0..PLACES).map(|_| draw()).find(is_clear).unwrap_or(last) };
+        let heading = Heading::new(u8::try_from(chance.below(u32::from(HEADINGS))).unwrap_or(0));
+        let habit = u32::try_from(chance.number() >> 32).unwrap_or(0);
+        Other { color, start: Pose { x: spot[0], y: spot[1], heading }, habit }
+    }
+
+    /// A mark on a body, in a colour other than its wearer's and the earlier marks'.
+    fn worn(&self, mark: Mark, before: &[WornMark], chance: &mut Rng) -> Option<WornMark> {
+        let (wearer, body) = match mark.on {
+            Wearer::Own => (0, self.scene.body_color),
+            Wearer::Other => (1, self.scene.others.first()?.color),
+        };
+        let is_free = |color: Color| color != body && color != self.scene.body_color;
+        let free = self.other_colors(is_free);
+        let unused = self.other_colors(|color| is_free(color) && before.iter().all(|other| other.color != color));
+        let drawn = if unused.is_empty() { &free } else { &unused };
+        let color = match mark.color {
+            MarkColor::Named(color) if is_free(color) => color,
+            MarkColor::Named(_) | MarkColor::Random if drawn.is_empty() => return None,
+            MarkColor::Named(_) | MarkColor::Random => chance.one_of(drawn),
+        };
+        let patch = (mark.part == Part::Front).then(|| Patch {
+            aside_mm: 20 * chance.between(-2, 2),
+            height_mm: 50 * chance.between(19, 23),
+            edge_mm: 20 * chance.between(5, 8),
+        });
+        Some(WornMark { part: mark.part, color, from_t: mark.from_t, wearer, patch })
+    }
+}

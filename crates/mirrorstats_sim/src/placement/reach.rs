@@ -1,0 +1,99 @@
+//! The check that a scene is solvable: the agent can walk to a place where it sees itself, and to every candidate.
+
+use std::collections::VecDeque;
+
+use super::super::config::WorldConfig;
+use super::super::floor::FloorPlan;
+use super::super::scene::{Cube, Scene};
+use super::Occlusion;
+use mirrorstats_experiment::spec::Cubes;
+
+/// The distance between points of the floor's lattice, m.
+const LATTICE: f64 = 0.4;
+
+/// The maximum distance from the mirror at which a body sees itself well, m.
+const NEAR_ENOUGH: f64 = 3.0;
+
+/// Tested heights of the body in the mirror, m above the floor, and tested places across it, m.
+const HEIGHTS: [f64; 5] = [0.3, 0.6, 0.9, 1.15, 1.4];
+const ACROSS: [f64; 3] = [-0.16, 0.0, 0.16];
+
+/// The share of the body that must be visible for self-identification.
+const ENOUGH: f64 = 0.75;
+
+/// Returns true if the agent can walk to a place with a clear reflection, and to each candidate, within a third of the
+/// episode each. Clutter, if any, must hide at least half of the body from the required share of places before the
+/// mirror (paper, section 3: mirror evidence in E5 is partial or occluded).
+pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
+    let near = near(config, scene, plan);
+    let shares = shares(config, scene, &near);
+    let Occlusion { places, hidden, .. } = Occlusion::of_shares(&shares);
+    let has_clutter = matches!(scene.experiment.layout.cubes, Cubes::Clutter { .. }) && !scene.cubes.is_empty();
+    let reaches =
+        |cube: &Cube| near.iter().any(|spot| cube.square().distance(*spot) <= plan.radius + config.body.step_length);
+    shares.iter().any(|share| *share >= ENOUGH)
+        && (!has_clutter || 100 * hidden >= config.clutter.hides_percent as usize * places)
+        && (!scene.experiment.has_candidates() || scene.cubes.iter().all(reaches))
+}
+
+/// The places that the agent can walk to within a third of the episode.
+fn near(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> Vec<[f64; 2]> {
+    let budget = f64::from(config.episode.steps) / 3.0 * config.body.step_length;
+    lengths(scene, plan).into_iter().filter(|(_, length)| *length <= budget).map(|(spot, _)| spot).collect()
+}
+
+/// The visible shares of the body in the mirror, from those of these places that are before it.
+fn shares(config: &WorldConfig, scene: &Scene, near: &[[f64; 2]]) -> Vec<f64> {
+    near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect()
+}
+
+/// The occlusion by cubes, from the places before the mirror in a scene.
+pub(super) fn occlusion(config: &WorldConfig, scene: &Scene) -> Occlusion {
+    Occlusion::of_shares(&shares(config, scene, &near(config, scene, &scene.floor_plan(config))))
+}
+
+/// The share of its body that an agent here sees when it faces the mirror squarely; `None` if the place is not before
+/// the mirror, or too far from it.
+fn share_shown(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> Option<f64> {
+    let mirror = scene.mirror;
+    let away = mirror.distance(spot, config);
+    let is_before = mirror.aside(spot).abs() <= config.mirror.width / 2.0 - 0.3 && away <= NEAR_ENOUGH;
+    let points = || ACROSS.into_iter().flat_map(|across| HEIGHTS.into_iter().map(move |height| [across, height]));
+    let hides = |cube: &Cube, point: [f64; 2]| is_hidden(config, scene, cube, spot, point);
+    let shown = points().filter(|point| !scene.cubes.iter().any(|cube| hides(cube, *point))).count();
+    #[expect(clippy::cast_precision_loss, reason = "a few points")]
+    is_before.then(|| shown as f64 / points().count() as f64)
+}
+
+/// Returns true if a cube hides the point of the body at this place across it and this height from an agent who looks
+/// into the mirror. It may be on the way to the mirror or back.
+fn is_hidden(config: &WorldConfig, scene: &Scene, cube: &Cube, spot: [f64; 2], [across, height]: [f64; 2]) -> bool {
+    let mirror = scene.mirror;
+    let (away, depth) = (mirror.distance(spot, config), mirror.distance([cube.x, cube.y], config));
+    let aside = mirror.aside([cube.x, cube.y]) - mirror.aside(spot);
+    let eye = config.eye.height;
+    depth < away
+        && [away - depth, away + depth].into_iter().any(|way| {
+            let part = way / (2.0 * away);
+            let passes = [part * across, eye + part * (height - eye)];
+            (passes[0] - aside).abs() <= cube.edge / 2.0 && (cube.base..=cube.top()).contains(&passes[1])
+        })
+}
+
+fn lengths(scene: &Scene, plan: &FloorPlan) -> Vec<([f64; 2], f64)> {
+    let mut found = vec![([0_i32, 0_i32], 0.0)];
+    let mut queue = VecDeque::from([0]);
+    let spot = |at: [i32; 2]| [scene.start.x + LATTICE * f64::from(at[0]), scene.start.y + LATTICE * f64::from(at[1])];
+    let mut seen = std::collections::BTreeSet::from([[0, 0]]);
+    while let Some(at) = queue.pop_front() {
+        let (from, length) = found[at];
+        for to in [[1, 0], [-1, 0], [0, 1], [0, -1]].map(|[right, up]| [from[0] + right, from[1] + up]) {
+            if !seen.contains(&to) && plan.is_passable(spot(from), spot(to)) {
+                seen.insert(to);
+                queue.push_back(found.len());
+                found.push((to, length + LATTICE));
+            }
+        }
+    }
+    found.into_iter().map(|(at, length)| (spot(at), length)).collect()
+}

@@ -1,0 +1,144 @@
+//! A model's journals in a folder: answers, costs, and averages of finished episodes.
+
+use std::path::Path;
+
+use super::journal::{Journal, JournalError};
+use super::model::{Memory, Vlm, tokens};
+use crate::limits::Spend;
+
+/// The average answer of finished episodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Typical {
+    /// Finished episodes with a journal.
+    pub episodes: u64,
+    /// Answers per episode.
+    pub steps: f64,
+    /// US dollars per answer; `None` if no answer has a cost or a price.
+    pub cost_usd: Option<f64>,
+    /// Tokens per reply; `None` if not counted.
+    pub completion_tokens: Option<f64>,
+    /// Seconds per answer.
+    pub seconds: f64,
+}
+
+impl Vlm {
+    /// The number of an episode's steps that already have an answer.
+    pub fn answered(&self, episode: &str) -> Result<u64, JournalError> {
+        match Journal::cassette(&self.memory.path(episode)) {
+            Ok(journal) => Ok(journal.answers().count() as u64),
+            Err(JournalError::Missing { .. }) => Ok(0),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Adds the spending of earlier starts on the model, from its journals. `slug` is the model's name in episode names.
+    pub fn count_spent(&self, slug: &str) -> Result<(), JournalError> {
+        let Memory::Journals(folder) = &self.memory else { return Ok(()) };
+        self.account.begin_with(spent(self, folder, slug)?);
+        Ok(())
+    }
+
+    /// Reads the journals of these finished episodes; `None` if no journal exists.
+    pub fn typical<'a>(&self, episodes: impl Iterator<Item = &'a str>) -> Result<Option<Typical>, JournalError> {
+        let (mut count, mut steps, mut seconds) = (0, Vec::new(), Vec::new());
+        let (mut costs, mut tokens) = (Vec::new(), Vec::new());
+        for episode in episodes {
+            let journal = match Journal::cassette(&self.memory.path(episode)) {
+                Err(JournalError::Missing { .. }) => continue,
+                journal => journal?,
+            };
+            count += 1;
+            steps.push(f64::from(u32::try_from(journal.answers().count()).unwrap_or(u32::MAX)));
+            for recorded in journal.answers() {
+                seconds.push(f64::from(recorded.latency_ms) / 1e3);
+                let Some(answer) = self.read(&recorded.body) else { continue };
+                costs.extend(self.choice.cost_usd(&answer));
+                tokens.extend(answer.completion_tokens.map(f64::from));
+            }
+        }
+        let [steps, cost_usd, completion_tokens, seconds] = [&steps, &costs, &tokens, &seconds].map(|all| mean(all));
+        Ok(steps.zip(seconds).map(|(steps, seconds)| Typical {
+            episodes: count,
+            steps,
+            cost_usd,
+            completion_tokens,
+            seconds,
+        }))
+    }
+}
+
+/// The spending on this model according to its journals, for the account of a restarted run. `slug` is its name in
+/// episode names; other models' journals in the folder have other prices and limits.
+fn spent(vlm: &Vlm, folder: &Path, slug: &str) -> Result<Spend, JournalError> {
+    let mut spend = Spend::default();
+    let entries = match std::fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(spend),
+        Err(source) => return Err(JournalError::Io { path: folder.to_owned(), source }),
+    };
+    for entry in entries {
+        let path = entry.map_err(|source| JournalError::Io { path: folder.to_owned(), source })?.path();
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        if path.extension().is_none_or(|ending| ending != "jsonl") || model_of(stem) != Some(slug) {
+            continue;
+        }
+        let journal = Journal::cassette(&path)?;
+        add_journal(vlm, &journal, &mut spend);
+    }
+    Ok(spend)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "there are fewer than 2^53 answers")]
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+fn add_journal(vlm: &Vlm, journal: &Journal, spend: &mut Spend) {
+    let usd = |at_most: Option<[u64; 2]>| at_most.and_then(|tokens| vlm.cost_of(tokens)).unwrap_or(0.0);
+    let requests = journal.requests();
+    spend.requests += requests.sent;
+    for at_most in requests.unanswered {
+        spend.add_unanswered(usd(at_most));
+    }
+    for recorded in journal.answers() {
+        let answer = vlm.read(&recorded.body);
+        if let Some(answer) = &answer {
+            vlm.learn_from(answer);
+        }
+        let cost = answer.as_ref().and_then(|answer| vlm.choice.cost_usd(answer));
+        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(recorded.at_most));
+    }
+}
+
+/// The model in the name of an episode's journal: `slug` in `E1-slug-s1-r3`, and in `E1-slug@near-s1-r3-x2`.
+fn model_of(stem: &str) -> Option<&str> {
+    let without_last = |name, mark: char| {
+        let (rest, last): (&str, &str) = str::rsplit_once(name, '-')?;
+        let number = last.strip_prefix(mark)?;
+        (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(rest)
+    };
+    let first = without_last(stem, 'x').unwrap_or(stem);
+    let (_, subject) = without_last(without_last(first, 'r')?, 's')?.split_once('-')?;
+    Some(subject.split_once('@').map_or(subject, |(model, _)| model))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::model_of;
+
+    #[test]
+    fn a_journal_names_its_model() {
+        for (stem, expected) in [
+            ("E1-gpt-5-1-s1-r3", Some("gpt-5-1")),
+            ("E1-gpt-5-s1-r3-x2", Some("gpt-5")),
+            ("E5-a@near-s1-s2-r10", Some("a")),
+            ("E1-a-s1-r1-s2-r3", Some("a-s1-r1")),
+            ("E1-s2-r3", None),
+            ("E1-a-s2", None),
+            ("notes", None),
+            ("", None),
+        ] {
+            assert_eq!(model_of(stem), expected, "{stem}");
+        }
+    }
+}

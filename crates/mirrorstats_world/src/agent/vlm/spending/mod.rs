@@ -1,2 +1,0 @@
-pub mod estimate;
-pub mod limits;

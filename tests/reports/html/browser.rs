@@ -1,11 +1,14 @@
 //! A headless Chromium, driven over its debugging pipe: does what a reader does, and records what the browser reports.
+//! Each [`Browser`] has storage and settings of its own. The processes are kept: a start takes as long as a short test.
 //!
 //! Rule: the browser records every console message, exception, violation of the page's policy and request for anything
 //! but the page itself. Each fails the test at [`Browser::close`].
 
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::Duration;
@@ -34,12 +37,23 @@ const FLAGS: [&str; 13] = [
     "--window-size=1280,900",
 ];
 
-/// A browser with one page open.
-pub struct Browser {
-    process: Child,
-    commands: Option<ChildStdin>,
+/// A running Chromium. It ends when its pipe closes, at the latest with the tests.
+struct Chromium {
+    _process: Child,
+    commands: ChildStdin,
     answers: Receiver<Value>,
     last_id: u64,
+}
+
+/// Processes without a page.
+static IDLE: Mutex<Vec<Chromium>> = Mutex::new(Vec::new());
+
+/// A browser with one page open.
+pub struct Browser {
+    /// `None` once it is given back.
+    chromium: Option<Chromium>,
+    /// The storage and the settings of this browser alone.
+    context: String,
     session: Option<String>,
     faults: Vec<String>,
     loads: usize,
@@ -85,7 +99,8 @@ impl Browser {
     fn visit(&mut self, address: &str, page: &str, before: &[(&str, Value)]) {
         let browser = self;
         page.clone_into(&mut browser.page);
-        let target = browser.send("Target.createTarget", &json!({"url": "about:blank"}));
+        let target = json!({"url": "about:blank", "browserContextId": browser.context, "newWindow": true});
+        let target = browser.send("Target.createTarget", &target);
         let attached = json!({"targetId": target["targetId"], "flatten": true});
         let session = browser.send("Target.attachToTarget", &attached)["sessionId"].as_str().unwrap().to_owned();
         browser.session = Some(session);
@@ -101,50 +116,21 @@ impl Browser {
         }
     }
 
-    /// Starts the browser. A shell sets up file descriptors 3 and 4 for the pipe.
     fn start(program: &Path) -> Self {
-        let home = tempfile::tempdir().unwrap();
-        let mut process = Command::new("sh")
-            .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null"])
-            .arg(program)
-            .args(FLAGS)
-            .arg(format!("--user-data-dir={}", home.path().join("profile").display()))
-            .arg("about:blank")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let (sender, answers) = channel();
-        let mut pipe = BufReader::new(process.stdout.take().unwrap());
-        thread::spawn(move || {
-            loop {
-                let mut message = Vec::new();
-                match pipe.read_until(0, &mut message) {
-                    Ok(1..) if message.pop() == Some(0) => {}
-                    _ => return,
-                }
-                if sender.send(serde_json::from_slice(&message).unwrap()).is_err() {
-                    return;
-                }
-            }
-        });
-        let commands = process.stdin.take();
-        let (session, page) = (None, String::new());
-        Self { process, commands, answers, last_id: 0, session, faults: Vec::new(), loads: 0, page, home }
+        let idle = IDLE.lock().unwrap().pop();
+        let chromium = Some(idle.unwrap_or_else(|| Chromium::start(program)));
+        let (session, page, home) = (None, String::new(), tempfile::tempdir().unwrap());
+        let context = String::new();
+        let mut browser = Self { chromium, context, session, faults: Vec::new(), loads: 0, page, home };
+        let context = browser.send("Target.createBrowserContext", &json!({}));
+        context["browserContextId"].as_str().unwrap().clone_into(&mut browser.context);
+        browser
     }
 
     /// Sends a command of the debugging protocol and returns its result.
     pub fn send(&mut self, method: &str, parameters: &Value) -> Value {
-        self.last_id += 1;
-        let id = self.last_id;
-        let mut message = json!({"id": id, "method": method, "params": parameters});
-        if let Some(session) = &self.session {
-            message["sessionId"] = json!(session);
-        }
-        let mut bytes = serde_json::to_vec(&message).unwrap();
-        bytes.push(0);
-        self.commands.as_mut().unwrap().write_all(&bytes).unwrap();
+        let chromium = self.chromium.as_mut().unwrap();
+        let id = chromium.send(method, parameters, self.session.as_deref());
         loop {
             let answer = self.receive();
             if answer["id"] == json!(id) {
@@ -165,7 +151,11 @@ impl Browser {
     }
 
     fn receive(&mut self) -> Value {
-        let message = self.answers.recv_timeout(PATIENCE).expect("the browser answers");
+        let message = self.chromium.as_mut().unwrap().answers.recv_timeout(PATIENCE).expect("the browser answers");
+        // What is late from the page of another browser.
+        if message.get("sessionId").is_some() && message["sessionId"].as_str() != self.session.as_deref() {
+            return message;
+        }
         let parameters = &message["params"];
         match message["method"].as_str() {
             Some("Page.loadEventFired") => self.loads += 1,
@@ -294,15 +284,74 @@ fn errors_and_requests_of_a_page_are_noticed() {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // The browser ends when its pipe closes; otherwise it is killed.
-        drop(self.commands.take());
-        for _ in 0..50 {
-            if matches!(self.process.try_wait(), Ok(Some(_))) {
-                return;
-            }
-            thread::sleep(Duration::from_millis(20));
+        // A browser that a failed test leaves in an unknown state ends with it.
+        let mut chromium = self.chromium.take().unwrap();
+        if !thread::panicking() {
+            chromium.send("Target.disposeBrowserContext", &json!({"browserContextId": self.context}), None);
+            IDLE.lock().unwrap().push(chromium);
         }
-        let _ = self.process.kill();
-        let _ = self.process.wait();
     }
+}
+
+impl Chromium {
+    /// Starts the browser. A shell sets up file descriptors 3 and 4 for the pipe.
+    fn start(program: &Path) -> Self {
+        let mut process = Command::new("sh")
+            .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null"])
+            .arg(program)
+            .args(FLAGS)
+            .arg(format!("--user-data-dir={}", profile().display()))
+            .arg("about:blank")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let (sender, answers) = channel();
+        let mut pipe = BufReader::new(process.stdout.take().unwrap());
+        thread::spawn(move || {
+            loop {
+                let mut message = Vec::new();
+                match pipe.read_until(0, &mut message) {
+                    Ok(1..) if message.pop() == Some(0) => {}
+                    _ => return,
+                }
+                if sender.send(serde_json::from_slice(&message).unwrap()).is_err() {
+                    return;
+                }
+            }
+        });
+        let commands = process.stdin.take().unwrap();
+        Self { _process: process, commands, answers, last_id: 0 }
+    }
+
+    /// Sends a command; returns the number that its answer will have.
+    fn send(&mut self, method: &str, parameters: &Value, session: Option<&str>) -> u64 {
+        self.last_id += 1;
+        let mut message = json!({"id": self.last_id, "method": method, "params": parameters});
+        if let Some(session) = session {
+            message["sessionId"] = json!(session);
+        }
+        let mut bytes = serde_json::to_vec(&message).unwrap();
+        bytes.push(0);
+        self.commands.write_all(&bytes).unwrap();
+        self.last_id
+    }
+}
+
+/// A new folder for the files of a browser. Those of earlier tests are removed: nothing does so when tests end.
+fn profile() -> PathBuf {
+    static STARTED: AtomicUsize = AtomicUsize::new(0);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("browsers");
+    let number = STARTED.fetch_add(1, Ordering::Relaxed);
+    if number == 0 {
+        let earlier = std::fs::read_dir(&folder).into_iter().flatten().flatten();
+        let ended = earlier.filter(|entry| {
+            let name = entry.file_name();
+            let process = name.to_str().and_then(|name| name.split('-').next());
+            process.is_some_and(|process| !Path::new("/proc").join(process).exists())
+        });
+        ended.for_each(|entry| drop(std::fs::remove_dir_all(entry.path())));
+    }
+    folder.join(format!("{}-{number}", std::process::id()))
 }

@@ -3,7 +3,7 @@
 use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
-use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 use crate::scratch;
 
@@ -40,8 +40,7 @@ pub fn episodes(count: usize) -> Vec<Episode> {
 pub fn trace(count: usize) -> Vec<u8> {
     let episodes = episodes(count);
     let columns = OptionalColumns::used_by(&episodes);
-    let mut encoder =
-        TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).expect("known columns");
+    let mut encoder = TraceWriter::new(Vec::new(), &TraceMetadata { recording: None, columns }).expect("known columns");
     for episode in &episodes {
         encoder.write(episode).expect("a sound episode");
     }

@@ -123,7 +123,7 @@ fn lines() -> Vec<Vec<u8>> {
     let of_episode = |episode: &mirrorstats_trace::episodes::episode::Episode| {
         let line = |(t, step)| {
             let mut row = json!(episode);
-            let decision = json!(Decision::of(t, step));
+            let decision = json!(Decision::from_step(t, step));
             let (Some(row_keys), Some(keys)) = (row.as_object_mut(), decision.as_object()) else {
                 return String::new();
             };
@@ -150,7 +150,7 @@ fn logs() -> Vec<Vec<u8>> {
             EpisodeLog::create(&path, &head, &json!({ "type": "object" }), 1).expect("a folder for temporary files");
         for (t, step) in (1..).zip(&episode.steps) {
             let time = u64::try_from(t).unwrap_or(1) * 1_000_000_000;
-            log.decided(time, &Decision::of(t, step)).expect("a folder for temporary files");
+            log.decided(time, &Decision::from_step(t, step)).expect("a folder for temporary files");
         }
         log.end(9_000_000_000, &episode).expect("a folder for temporary files");
         parts.push((assemble::place(&episode), path));

@@ -14,8 +14,8 @@ use pyo3::prelude::*;
 /// The error of a study, in the class that shows what to change.
 pub fn of_study(error: StudyError) -> PyErr {
     let kind = kind(&error);
-    if let StudyError::Import(ImportError::Faults { told, more }) = &error {
-        return raised(kind, &in_rows(told, *more), &[]);
+    if let StudyError::Import(ImportError::Faults { faults, more }) = &error {
+        return raised(kind, &in_rows(faults, *more), &[]);
     }
     of_failure(&error.into(), kind)
 }
@@ -48,7 +48,7 @@ fn kind(error: &StudyError) -> &'static str {
 }
 
 /// The message for faults in rows: a data frame has no lines, and its rows count from 0.
-fn in_rows(told: &[Fault], more: usize) -> String {
+fn in_rows(faults: &[Fault], more: usize) -> String {
     let one = |fault: &Fault| {
         let row = fault.line.map_or_else(String::new, |line| format!("row {} (from 0)", line - 1));
         let column = fault.key.as_ref().map_or_else(String::new, |key| format!("column `{key}`"));
@@ -61,8 +61,8 @@ fn in_rows(told: &[Fault], more: usize) -> String {
         };
         format!("{place}{further}: expected {}, found {}\n  help: {}", fault.expected, fault.found, fault.help)
     };
-    let told = told.iter().map(one).collect::<Vec<_>>().join("\n");
-    if more == 0 { told } else { format!("{told}\nand {more} more") }
+    let text = faults.iter().map(one).collect::<Vec<_>>().join("\n");
+    if more == 0 { text } else { format!("{text}\nand {more} more") }
 }
 
 /// The library's error, with the message of the command line.

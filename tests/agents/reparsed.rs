@@ -33,7 +33,7 @@ fn write(path: &Path, recording: Value, episodes: &[(&str, Vec<Step>)]) {
     for (id, steps) in episodes {
         writer.write(&traces::episode(id, steps.clone())).unwrap();
     }
-    writer.finish().unwrap();
+    writer.commit().unwrap();
 }
 
 /// Two episodes: in one the attributions change; in the other the first reply now gives an action.

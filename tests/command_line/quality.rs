@@ -180,7 +180,7 @@ fn an_experiment_that_the_definitions_describe_otherwise_is_a_note() {
     let metadata = TraceMetadata { recording, columns: OptionalColumns::NONE };
     let mut writer = TraceWriter::create(&path, &metadata).unwrap();
     writer.write(&episode("e1", vec![Step { action: Some(Action::Done), ..Step::default() }])).unwrap();
-    writer.finish().unwrap();
+    writer.commit().unwrap();
     let told = run(folder.path(), &["trace", "validate", "a.parquet"]).done();
     assert!(told.contains("the chance level of TSA of `E1` as the definitions give it: 1/3"), "{told}");
     assert!(told.contains("found `Other`") && told.contains("0 errors, 2 notes"), "{told}");

@@ -37,7 +37,7 @@ pub fn write_trace(path: &Path, episodes: &[Episode], columns: OptionalColumns) 
     for episode in episodes {
         writer.write(episode).unwrap();
     }
-    writer.finish().unwrap();
+    writer.commit().unwrap();
 }
 
 /// Scores in CSV, row by row, without the columns `unusable_replies` and `mirrorstats.declared`.

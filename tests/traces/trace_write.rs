@@ -6,7 +6,7 @@ use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::write::merge;
-use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter, write_episodes};
 use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -23,7 +23,7 @@ fn with_extra(mut episode: Episode, extra: Extra) -> Episode {
 }
 
 fn encode(metadata: &TraceMetadata, episodes: &[Episode]) -> Vec<u8> {
-    let mut encoder = TraceEncoder::new(Vec::new(), metadata).unwrap();
+    let mut encoder = TraceWriter::new(Vec::new(), metadata).unwrap();
     for episode in episodes {
         encoder.write(episode).unwrap();
     }
@@ -55,7 +55,7 @@ fn only_declared_optional_columns_are_written() {
     assert_eq!(OptionalColumns::used_by([&plain]), OptionalColumns::NONE);
     assert_eq!(OptionalColumns::used_by([&plain, &seen]), OptionalColumns::named(&["mirror_px"]).unwrap());
     assert_eq!(OptionalColumns::named(&["t"]), None);
-    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata::default()).unwrap();
+    let mut encoder = TraceWriter::new(Vec::new(), &TraceMetadata::default()).unwrap();
     let error = encoder.write(&seen).unwrap_err().to_string();
     assert!(error.contains("`mirror_px`, which was not declared"), "{error}");
 }
@@ -80,7 +80,7 @@ fn forbidden_values_are_refused() {
         (capital, "expected `self_color` to be the lower-case name of a colour, `unknown`, or null, found `Red`"),
     ] {
         let metadata = TraceMetadata { columns: OptionalColumns::all(), ..TraceMetadata::default() };
-        let mut encoder = TraceEncoder::new(Vec::new(), &metadata).unwrap();
+        let mut encoder = TraceWriter::new(Vec::new(), &metadata).unwrap();
         let error = encoder.write(&refused).unwrap_err().to_string();
         assert!(error.contains(why), "{error}");
         assert_eq!(encoder.finish().unwrap(), encode(&metadata, &[]), "a refused episode leaves no row");
@@ -93,7 +93,7 @@ fn repairs_have_a_column_where_replies_are_read() {
     let columns = |agent: serde_json::Value| OptionalColumns::recorded(&serde_json::json!({ "agent": agent }));
     let scripted = columns(serde_json::json!({ "scripted": "oracle" }));
     assert_ne!(scripted, columns(serde_json::json!({ "id": "x" })), "a scripted agent's replies are not read");
-    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns: scripted }).unwrap();
+    let mut encoder = TraceWriter::new(Vec::new(), &TraceMetadata { recording: None, columns: scripted }).unwrap();
     let error = encoder.write(&repaired).unwrap_err().to_string();
     assert!(error.contains("`reply_repair`, which was not declared"), "{error}");
 
@@ -103,7 +103,7 @@ fn repairs_have_a_column_where_replies_are_read() {
     let mut writer = TraceWriter::create(&path, &TraceMetadata { recording: None, columns }).unwrap();
     writer.write(&repaired).unwrap();
     writer.write(&episode("b", 1)).unwrap();
-    writer.finish().unwrap();
+    writer.commit().unwrap();
     let set = TraceSet::open(&[Input::new(&path)]).unwrap();
     assert!(set.column_names().contains(&"reply_repair") && !set.column_names().contains(&"mark_color"));
     let back: Vec<_> = merge::read(&path).unwrap().iter().map(|rows| rows.episode().unwrap()).collect();
@@ -121,7 +121,7 @@ fn a_palette_in_the_recording_applies_to_written_rows() {
         episode.steps[0].self_color = Some(color.into());
         episode
     };
-    let mut encoder = TraceEncoder::new(Vec::new(), &metadata(serde_json::json!(["teal", "magenta"]))).unwrap();
+    let mut encoder = TraceWriter::new(Vec::new(), &metadata(serde_json::json!(["teal", "magenta"]))).unwrap();
     for color in ["teal", "magenta", "unknown"] {
         encoder.write(&claiming(color, color)).unwrap();
     }
@@ -137,13 +137,13 @@ fn a_palette_in_the_recording_applies_to_written_rows() {
         );
         assert!(error.contains(&why), "{error}");
     }
-    let error = TraceEncoder::new(Vec::new(), &metadata(serde_json::json!(["Teal"]))).err().unwrap().to_string();
+    let error = TraceWriter::new(Vec::new(), &metadata(serde_json::json!(["Teal"]))).err().unwrap().to_string();
     assert!(error.contains("`palette` in `mirrorstats.recording` to be a list of lower-case names"), "{error}");
 }
 
 #[test]
 fn a_repeated_episode_id_is_refused() {
-    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata::default()).unwrap();
+    let mut encoder = TraceWriter::new(Vec::new(), &TraceMetadata::default()).unwrap();
     encoder.write(&episode("a", 1)).unwrap();
     let error = encoder.write(&episode("a", 2)).unwrap_err().to_string();
     assert!(error.contains("expected an id of its own"), "{error}");

@@ -103,7 +103,7 @@ impl ReparseAnswer {
             self.add_episode(&mut episode, &experiment);
             writer.write(&episode)?;
         }
-        Ok(writer.finish()?)
+        Ok(writer.commit()?)
     }
 
     fn add_episode(&mut self, episode: &mut Episode, experiment: &Spec) {
@@ -135,7 +135,7 @@ impl ReparseAnswer {
 fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
     let none = |found: &str| ReparseError::NoReplies { file: input.name.clone(), found: found.to_owned() };
     let file = TraceFile::open(input).map_err(|findings| {
-        TraceError::of(findings).map_or_else(|| none("a file that cannot be opened"), ReparseError::from)
+        TraceError::from_findings(findings).map_or_else(|| none("a file that cannot be opened"), ReparseError::from)
     })?;
     if file.column("reply").is_none() {
         return Err(none("no such column"));

@@ -2,10 +2,9 @@
 //!
 //! Rule: a number stays exact, or is refused or stays text; an empty cell is null. `nan` and `inf` are floats.
 
-use super::line::{LineValue, whole};
+use super::value::{LineValue, whole};
 use mirrorstats_trace::schema::Kind;
 
-/// The type of one cell, without its column.
 pub(super) fn kind_of(cell: &str) -> Kind {
     match cell {
         cell if cell.eq_ignore_ascii_case("true") || cell.eq_ignore_ascii_case("false") => Kind::Bool,
@@ -32,7 +31,6 @@ pub(super) fn typed(cell: &str, column: Kind) -> LineValue {
     }
 }
 
-/// A number in JSON or of a decimal type, whose spelling is known.
 pub(super) fn number(spelling: &str) -> LineValue {
     match kind_of(spelling) {
         Kind::String => LineValue::Unheld(spelling.to_owned()),
@@ -50,7 +48,6 @@ pub(super) fn is_odd(cell: &str) -> bool {
     is_absent(cell) || is_decimal(cell) && !is_held(cell)
 }
 
-/// The type that fits cells of both types.
 pub(super) fn joined(before: Kind, now: Kind) -> Kind {
     match (before, now) {
         (before, now) if before == now => now,

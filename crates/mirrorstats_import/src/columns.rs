@@ -6,7 +6,7 @@
 use indexmap::IndexMap;
 
 use super::error::{Fault, Place};
-use super::line::{self, LineValue, Members};
+use super::value::{LineValue, Members, whole};
 use super::{Limits, cell};
 use mirrorstats_exact::suggest::nearest;
 use mirrorstats_trace::episodes::identification::normal_form;
@@ -31,7 +31,6 @@ pub(super) struct Columns {
 #[derive(Debug, Default)]
 struct Inferred {
     kind: Option<Kind>,
-    /// The location of the first value that is not null.
     first: Option<Place>,
     /// True if a value has a type of its own, which cells of CSV must fit.
     is_typed: bool,
@@ -93,7 +92,7 @@ impl Columns {
                 LineValue::Cell(text) => *value = cell::typed(text, kind),
                 LineValue::Unheld(text) if kind == Kind::Float => *value = cell::typed(text, kind),
                 LineValue::Float(number) if kind == Kind::Int => {
-                    *value = line::whole(*number).map_or(LineValue::Float(*number), LineValue::Int);
+                    *value = whole(*number).map_or(LineValue::Float(*number), LineValue::Int);
                 }
                 _ => {}
             }
@@ -101,7 +100,6 @@ impl Columns {
         members
     }
 
-    /// The values with the types that all cells of their columns gave them.
     pub(super) fn with_cells(&self, mut members: Members) -> Members {
         for (key, value) in &mut members {
             if let (LineValue::Cell(text), Some(kind)) = (&*value, self.own.get(key).and_then(Inferred::kind)) {
@@ -111,7 +109,6 @@ impl Columns {
         members
     }
 
-    /// Checks a line against the schema and against the lines before it.
     pub(super) fn check(&mut self, members: &Members, place: &Place, limits: Limits<'_>) -> Vec<Fault> {
         let mut faults = Vec::new();
         for (key, value) in members {
@@ -181,7 +178,6 @@ impl Inferred {
         self.kind.or(self.odd.as_ref().map(|_| Kind::String))
     }
 
-    /// Adds a value; returns a fault if its type does not fit those before it.
     fn take(&mut self, kind: Option<Kind>, value: &LineValue, place: &Place) -> Option<Fault> {
         let now = kind?;
         if let LineValue::Cell(cell) = value
@@ -329,7 +325,6 @@ fn is_absent(value: &LineValue) -> bool {
     matches!(value, LineValue::Text(text) if cell::is_absent(text))
 }
 
-/// Returns true if the integer is the same as a float.
 #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "that is the question")]
 fn is_exact(number: i64) -> bool {
     (number as f64) as i128 == i128::from(number)

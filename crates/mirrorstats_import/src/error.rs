@@ -9,7 +9,7 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::schema::domain::is_general;
 
-const TOLD: usize = 10;
+const MOST_FAULTS: usize = 10;
 /// The number of faults in the message; the first one is usually the cause.
 const SHOWN: usize = 4;
 
@@ -18,16 +18,16 @@ const OF_MIRRORS: [&str; 3] = ["body_color", "action", "self_color"];
 
 #[derive(Debug, Default)]
 pub(super) struct Faults {
-    told: Vec<Fault>,
+    faults: Vec<Fault>,
     more: usize,
 }
 
 impl Faults {
     pub(super) fn add(&mut self, fault: Fault) {
-        if let Some(same) = self.told.iter_mut().find(|told| told.is_alike(&fault)) {
+        if let Some(same) = self.faults.iter_mut().find(|kept| kept.repeats(&fault)) {
             same.further_lines += 1;
-        } else if self.told.len() < TOLD {
-            self.told.push(fault);
+        } else if self.faults.len() < MOST_FAULTS {
+            self.faults.push(fault);
         } else {
             self.more += 1;
         }
@@ -37,16 +37,16 @@ impl Faults {
         faults.into_iter().for_each(|fault| self.add(fault));
     }
 
-    pub(super) fn none(&mut self) -> Result<(), ImportError> {
-        let Self { told, more } = std::mem::take(self);
-        if told.is_empty() { Ok(()) } else { Err(ImportError::Faults { told, more }) }
+    pub(super) fn check(&mut self) -> Result<(), ImportError> {
+        let Self { faults, more } = std::mem::take(self);
+        if faults.is_empty() { Ok(()) } else { Err(ImportError::Faults { faults, more }) }
     }
 }
 
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
-    #[error("{}", listed(told, *more))]
-    Faults { told: Vec<Fault>, more: usize },
+    #[error("{}", listed(faults, *more))]
+    Faults { faults: Vec<Fault>, more: usize },
     #[error("cannot read {file}; check the path and its permissions")]
     Read { file: String, source: io::Error },
     #[error("{file}: expected the lines of the first pass, found others\n  help: import it when nothing writes to it")]
@@ -68,12 +68,12 @@ impl ImportError {
 
 impl From<Fault> for ImportError {
     fn from(fault: Fault) -> Self {
-        Self::Faults { told: vec![fault], more: 0 }
+        Self::Faults { faults: vec![fault], more: 0 }
     }
 }
 
-fn listed(told: &[Fault], more: usize) -> String {
-    let lacks = |column: &str| told.iter().any(|fault| fault.key.as_deref() == Some(column) && fault.found == "none");
+fn listed(faults: &[Fault], more: usize) -> String {
+    let lacks = |column: &str| faults.iter().any(|fault| fault.key.as_deref() == Some(column) && fault.found == "none");
     let is_other = OF_MIRRORS.into_iter().all(lacks);
     let cause = is_other.then(|| {
         let columns = OF_MIRRORS.map(|column| format!("`{column}`")).join(", ");
@@ -85,9 +85,10 @@ fn listed(told: &[Fault], more: usize) -> String {
     });
     let of_mirror = |fault: &&Fault| !is_other || fault.found != "none" || fault.key.as_deref().is_none_or(is_general);
     // A value that is there says more than one that is missing.
-    let (missing, wrong): (Vec<&Fault>, Vec<&Fault>) = told.iter().filter(of_mirror).partition(|it| it.found == "none");
+    let (missing, wrong): (Vec<&Fault>, Vec<&Fault>) =
+        faults.iter().filter(of_mirror).partition(|it| it.found == "none");
     let shown: Vec<String> = wrong.into_iter().chain(missing).take(SHOWN).map(ToString::to_string).collect();
-    let more = more + told.len() - shown.len();
+    let more = more + faults.len() - shown.len();
     let more = if more == 0 { String::new() } else { format!("\nand {more} more; nothing was written") };
     format!("{}{}{more}", cause.unwrap_or_default(), shown.join("\n"))
 }
@@ -121,7 +122,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    pub(super) fn is_alike(&self, other: &Self) -> bool {
+    pub(super) fn repeats(&self, other: &Self) -> bool {
         let words = |fault: &Self| (fault.file.clone(), fault.key.clone(), fault.expected.clone());
         self.line.is_some() && other.line.is_some() && words(self) == words(other)
     }

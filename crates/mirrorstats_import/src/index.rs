@@ -3,8 +3,9 @@
 use std::collections::HashMap;
 
 use super::error::{Fault, Place};
-use super::line::{LineValue, Members};
-use super::text::{Line, Text};
+use super::line::Line;
+use super::text::Text;
+use super::value::{LineValue, Members};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::schema::{COLUMNS, DeclaredColumn};
 
@@ -17,7 +18,6 @@ pub(super) struct IndexedStep {
     line: u64,
 }
 
-/// The first line of an episode.
 #[derive(Debug)]
 struct Head {
     id: String,
@@ -38,7 +38,6 @@ fn value<'a>(members: &'a Members, name: &str) -> &'a LineValue {
 }
 
 impl Index {
-    /// An index that compares the constant columns of the schema and of the definitions.
     pub(super) fn new(declared: &[DeclaredColumn]) -> Self {
         let known = COLUMNS.iter().filter(|column| column.constant && column.name != "episode_id");
         let declared = declared.iter().filter(|column| column.constant).map(|column| column.name.as_str());

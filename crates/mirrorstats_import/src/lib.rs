@@ -22,6 +22,7 @@ mod mapping;
 pub mod schema;
 mod table;
 mod text;
+mod value;
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
@@ -40,7 +41,6 @@ pub use text::Text;
 use columns::Columns;
 use error::Faults;
 use index::Index;
-use line::Members;
 use mirrorstats_exact::replace::NewFile;
 use mirrorstats_trace::episodes::identification::put_version;
 use mirrorstats_trace::error::TraceError;
@@ -50,6 +50,7 @@ use mirrorstats_trace::schema::colors::palette::Palette;
 use mirrorstats_trace::schema::{Kind, Value};
 use mirrorstats_trace::validate::{Expected, validate_as};
 use mirrorstats_trace::write::row_groups::{Gathered, RowGroups, field};
+use value::{LineValue, Members};
 
 /// Limits on the values of steps beyond the schema, and the trace's declarations about them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -111,9 +112,9 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
         survey(at, text, limits, &mut columns, &mut index, &mut faults)?;
     }
     faults.extend(columns.faults());
-    faults.none()?;
+    faults.check()?;
     let steps = index.into_steps(texts, &mut faults);
-    faults.none()?;
+    faults.check()?;
     let file = write(texts, &columns, &steps, out, limits)?;
     check(&file, out, limits.expected)?;
     file.commit().map_err(|error| TraceError::write(out, error))?;
@@ -203,7 +204,7 @@ fn write(
 
 fn add(rows: &mut Gathered, members: &Members) -> Result<(), ()> {
     // A row may have a thousand columns.
-    let members: HashMap<&str, &line::LineValue> = members.iter().map(|(key, value)| (key.as_str(), value)).collect();
+    let members: HashMap<&str, &LineValue> = members.iter().map(|(key, value)| (key.as_str(), value)).collect();
     for (field, values) in rows.layout.fields().iter().zip(&mut rows.columns) {
         let value = members.get(field.name().as_str()).copied();
         values.push(plain(value, field.data_type())?).ok_or(())?;
@@ -213,14 +214,14 @@ fn add(rows: &mut Gathered, members: &Members) -> Result<(), ()> {
 }
 
 #[expect(clippy::cast_precision_loss, reason = "the first pass refused what would lose anything in an own column")]
-fn plain<'a>(value: Option<&'a line::LineValue>, stored: &DataType) -> Result<Option<Value<'a>>, ()> {
+fn plain<'a>(value: Option<&'a LineValue>, stored: &DataType) -> Result<Option<Value<'a>>, ()> {
     Ok(Some(match value {
-        None | Some(line::LineValue::Null) => return Ok(None),
-        Some(line::LineValue::Bool(value)) => Value::Bool(*value),
-        Some(line::LineValue::Int(value)) if stored.is_floating() => Value::Float(*value as f64),
-        Some(line::LineValue::Int(value)) => Value::Int(*value),
-        Some(line::LineValue::Float(value)) => Value::Float(*value),
-        Some(line::LineValue::Text(text)) => Value::Text(text),
+        None | Some(LineValue::Null) => return Ok(None),
+        Some(LineValue::Bool(value)) => Value::Bool(*value),
+        Some(LineValue::Int(value)) if stored.is_floating() => Value::Float(*value as f64),
+        Some(LineValue::Int(value)) => Value::Int(*value),
+        Some(LineValue::Float(value)) => Value::Float(*value),
+        Some(LineValue::Text(text)) => Value::Text(text),
         Some(_) => return Err(()),
     }))
 }

@@ -5,98 +5,105 @@
 use std::collections::HashSet;
 use std::fmt;
 
-use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::Value;
 
 use super::cell;
-use super::error::Fault;
+use super::error::{Fault, Place};
 use super::format::json::{UNHELD, marked};
-use mirrorstats_exact::escape::{exact, visible};
+use super::value::{LineValue, Members};
+use mirrorstats_exact::budget::Limit;
 
 pub(super) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
-/// A value of a line or row. Rows of tables are stored with it, so that no value passes through text.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum LineValue {
-    Null,
-    Bool(bool),
-    Int(i64),
-    /// The spelling of a number that neither 64-bit integers nor floats hold, and of integers that only floats hold.
-    Unheld(String),
-    Float(f64),
-    Text(String),
-    /// A cell of CSV, whose type follows from its column.
-    Cell(String),
-    List,
-    Object(Members),
+/// A step with its whole reply; the longest reply of a model has some hundred thousand bytes.
+pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
+
+#[derive(Debug)]
+pub(super) struct Line {
+    pub(super) place: Place,
+    pub(super) offset: u64,
+    pub(super) bytes: Vec<u8>,
+    /// True if it ends with a line feed; the last line of a truncated file does not.
+    pub(super) ended: bool,
 }
 
-/// Keys and values in the order of the line; those of a nested object are dropped.
-pub(super) type Members = Vec<(String, LineValue)>;
+/// The keys and values of an object in their order, repeated ones included.
+pub(super) struct Pairs(Vec<(String, Value)>);
 
-impl LineValue {
-    /// Returns true if a column stores both as one value: `1` and `1.0`, or NaN twice.
-    #[expect(clippy::cast_precision_loss, reason = "columns of floats take only integers that they hold")]
-    pub(super) fn is_same(&self, other: &Self) -> bool {
-        let float = |value: &Self| match value {
-            Self::Int(number) => Some(*number as f64),
-            Self::Float(number) => Some(*number),
-            _ => None,
-        };
-        match (self, other) {
-            (Self::Float(_), _) | (_, Self::Float(_)) => {
-                float(self).zip(float(other)).is_some_and(|(one, two)| one.to_bits() == two.to_bits())
-            }
-            _ => self == other,
-        }
+impl Pairs {
+    pub(super) fn repeated(&self) -> Option<&str> {
+        let mut seen = HashSet::with_capacity(self.0.len());
+        self.0.iter().map(|(key, _)| key.as_str()).find(|key| !seen.insert(*key))
     }
 
-    pub(super) fn shown(&self) -> String {
-        const LONGEST: usize = 60;
-        match self {
-            Self::Null => "null".into(),
-            Self::Bool(value) => value.to_string(),
-            Self::Int(value) => value.to_string(),
-            Self::Float(value) => format!("{value:?}"),
-            Self::Text(text) | Self::Cell(text) if text.chars().count() > LONGEST => {
-                format!("the text `{}...`", visible(&text.chars().take(LONGEST).collect::<String>()))
-            }
-            Self::Unheld(number) => number.chars().take(LONGEST).collect(),
-            Self::Text(text) | Self::Cell(text) => format!("the text `{}`", exact(text)),
-            Self::List => "a list".into(),
-            Self::Object(_) => "an object".into(),
-        }
+    pub(super) fn row(&self) -> Vec<(&str, &Value)> {
+        self.0.iter().map(|(key, value)| (key.as_str(), value)).collect()
     }
 }
 
-/// The keys and values of a line; `ended` says whether it had a line feed.
-pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
+impl<'de> Deserialize<'de> for Pairs {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(PairsVisitor)
+    }
+}
+
+struct PairsVisitor;
+
+impl<'de> Visitor<'de> for PairsVisitor {
+    type Value = Pairs;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object, one step")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs, A::Error> {
+        let mut pairs = Vec::new();
+        while let Some(pair) = map.next_entry()? {
+            pairs.push(pair);
+        }
+        Ok(Pairs(pairs))
+    }
+}
+
+/// The keys and values of a line, each key once; `ended` says whether it had a line feed.
+pub(super) fn pairs(bytes: &[u8], ended: bool) -> Result<Pairs, Box<Fault>> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let found = format!("other bytes after the first {}", error.valid_up_to());
         Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
     })?;
-    let marked = marked(text.trim_end());
-    let mut json = serde_json::Deserializer::from_str(&marked);
-    match (Plain { is_line: true }).deserialize(&mut json).and_then(|value| json.end().map(|()| value)) {
-        Ok(LineValue::Object(members)) => Ok(unique(members)?),
-        Ok(other) => Err(Box::new(Fault::new("a JSON object, one step", other.shown(), "write one object a line"))),
-        Err(error) => Err(Box::new(no_json(text.trim_end(), ended, &error))),
+    let text = text.trim_end();
+    let marked = marked(text);
+    let pairs = serde_json::from_str::<Pairs>(&marked).map_err(|error| {
+        let is_object = marked.trim_start().starts_with('{');
+        Box::new(match if is_object { Err(error) } else { other_value(&marked) } {
+            Ok(found) => Fault::new("a JSON object, one step", found, "write one object a line"),
+            Err(error) => no_json(text, ended, &error),
+        })
+    })?;
+    match pairs.repeated() {
+        None => Ok(pairs),
+        Some(key) => Err(Box::new(Fault::new("each key once", "the key twice", "keep one of them").of_key(key))),
     }
+}
+
+/// The description of a value that is not an object. A list may be too deep for the parser.
+fn other_value(json: &str) -> serde_json::Result<String> {
+    serde_json::from_str::<IgnoredAny>(json)?;
+    let is_list = json.trim_start().starts_with('[');
+    Ok(if is_list { LineValue::List.shown() } else { of_json(&serde_json::from_str(json)?).shown() })
+}
+
+pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
+    let Pairs(pairs) = pairs(bytes, ended)?;
+    Ok(pairs.into_iter().map(|(key, value)| (key, of_json(&value))).collect())
 }
 
 fn of_text(text: &str) -> LineValue {
     text.strip_prefix(UNHELD).map_or_else(|| LineValue::Text(text.to_owned()), cell::number)
 }
 
-/// The integer that a number with a point equals, as in `2.0`.
-#[expect(clippy::cast_possible_truncation, reason = "it is whole and within 2^53")]
-pub(super) fn whole(number: f64) -> Option<i64> {
-    const EXACT: f64 = 9_007_199_254_740_992.0;
-    (number.fract() == 0.0 && number.abs() <= EXACT).then_some(number as i64)
-}
-
-/// The values of a stored row.
 pub(super) fn of_record(bytes: &[u8]) -> Result<Members, Box<Fault>> {
     if bytes.is_empty() {
         return Ok(Members::new());
@@ -125,14 +132,6 @@ pub(super) fn of_json(value: &Value) -> LineValue {
     }
 }
 
-fn unique(members: Members) -> Result<Members, Box<Fault>> {
-    let mut seen = HashSet::with_capacity(members.len());
-    match members.iter().find(|(key, _)| !seen.insert(key.as_str())) {
-        None => Ok(members),
-        Some((key, _)) => Err(Box::new(Fault::new("each key once", "the key twice", "keep one of them").of_key(key))),
-    }
-}
-
 fn no_json(text: &str, ended: bool, error: &serde_json::Error) -> Fault {
     let words = error.to_string();
     let what = words.split(" at line ").next().unwrap_or(&words);
@@ -158,68 +157,6 @@ fn is_no_number(text: &str, byte: usize) -> bool {
 /// The position of this byte in characters, both from 1.
 fn character(text: &str, byte: usize) -> usize {
     text.get(..text.floor_char_boundary(byte)).map_or(byte, |before| before.chars().count())
-}
-
-/// The line itself, or a value inside it; the contents of lists and objects there are read and dropped.
-struct Plain {
-    is_line: bool,
-}
-
-impl<'de> DeserializeSeed<'de> for Plain {
-    type Value = LineValue;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<LineValue, D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl<'de> Visitor<'de> for Plain {
-    type Value = LineValue;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a JSON value")
-    }
-
-    fn visit_unit<E>(self) -> Result<LineValue, E> {
-        Ok(LineValue::Null)
-    }
-
-    fn visit_bool<E>(self, value: bool) -> Result<LineValue, E> {
-        Ok(LineValue::Bool(value))
-    }
-
-    fn visit_i64<E>(self, value: i64) -> Result<LineValue, E> {
-        Ok(LineValue::Int(value))
-    }
-
-    fn visit_u64<E>(self, value: u64) -> Result<LineValue, E> {
-        Ok(i64::try_from(value).map_or_else(|_| LineValue::Unheld(value.to_string()), LineValue::Int))
-    }
-
-    fn visit_f64<E>(self, value: f64) -> Result<LineValue, E> {
-        Ok(LineValue::Float(value))
-    }
-
-    fn visit_str<E>(self, text: &str) -> Result<LineValue, E> {
-        Ok(of_text(text))
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<LineValue, A::Error> {
-        while list.next_element::<IgnoredAny>()?.is_some() {}
-        Ok(LineValue::List)
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<LineValue, A::Error> {
-        let mut members = Members::new();
-        while let Some(key) = map.next_key()? {
-            if self.is_line {
-                members.push((key, map.next_value_seed(Self { is_line: false })?));
-            } else {
-                map.next_value::<IgnoredAny>()?;
-            }
-        }
-        Ok(LineValue::Object(members))
-    }
 }
 
 #[cfg(test)]

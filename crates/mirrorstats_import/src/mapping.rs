@@ -9,8 +9,9 @@ use serde_json::{Map, Value, json};
 
 use super::cell;
 use super::format::json::marked;
-use super::line::{self, LineValue};
+use super::line;
 use super::table::{RowValues, Unreadable};
+use super::value::{LineValue, Node, whole};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::schema::domain::is_general;
 use mirrorstats_trace::schema::{Kind, column};
@@ -25,17 +26,10 @@ pub struct Mapping {
 
 pub(super) type Row<'a> = [(&'a str, &'a Value)];
 
-/// A column of a table under its new name.
 pub(super) struct MappedColumn<'m> {
     pub(super) name: &'m str,
     pub(super) values: RowValues,
     path: Option<&'m Path>,
-}
-
-/// A value, or a column of them, with parts.
-pub(super) trait Node: Sized {
-    fn member(&self, key: &str) -> Option<Self>;
-    fn item(&self, position: usize) -> Option<Self>;
 }
 
 /// The path to a value in a line: keys and positions separated by dots, and an integer to add to the value.
@@ -216,7 +210,7 @@ impl Path {
         }
         let number = match &found {
             LineValue::Int(number) => Some(*number),
-            LineValue::Float(number) => line::whole(*number),
+            LineValue::Float(number) => whole(*number),
             LineValue::Cell(text) => match cell::typed(text, Kind::Int) {
                 LineValue::Int(number) => Some(number),
                 _ => None,

@@ -12,8 +12,7 @@ use arrow::error::ArrowError;
 use arrow::util::display::{ArrayFormatter, FormatOptions};
 
 use super::cell;
-use super::line::LineValue;
-use super::mapping::Node;
+use super::value::{LineValue, Node};
 
 /// A column whose values are of the few types that rows have.
 #[derive(Clone, Debug)]
@@ -165,7 +164,6 @@ impl Node for ArrayRef {
     }
 }
 
-/// The type of lists with the same items.
 fn smaller(list: &ArrayRef) -> Option<DataType> {
     match list.data_type() {
         DataType::LargeList(item) | DataType::FixedSizeList(item, _) => Some(DataType::List(Arc::clone(item))),

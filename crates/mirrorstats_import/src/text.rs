@@ -13,8 +13,9 @@ use serde_json::Value;
 use super::error::{Fault, ImportError, Place};
 use super::format::lerobot::data_set;
 use super::format::{Format, HEAD, RowSink};
-use super::line::{self, BYTE_ORDER_MARK, LineValue, Members};
+use super::line::{self, BYTE_ORDER_MARK, LONGEST_LINE, Line};
 use super::mapping::Mapping;
+use super::value::{LineValue, Members};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::{hash, input};
 use mirrorstats_trace::inputs::{Input, NULL_FOLDER, folder_values};
@@ -24,10 +25,8 @@ pub struct Text {
     pub(super) name: Arc<str>,
     noun: &'static str,
     reader: BufReader<File>,
-    /// The position of the reader, in bytes from the start.
     offset: u64,
     lines: u64,
-    /// Columns in the names of its folders.
     pub(super) folders: Members,
     /// The hash of the file as it was compressed.
     sha256: Option<String>,
@@ -42,22 +41,8 @@ pub(super) struct Source {
     pub(super) mapping: Value,
 }
 
-#[derive(Debug)]
-pub(super) struct Line {
-    pub(super) place: Place,
-    pub(super) offset: u64,
-    pub(super) bytes: Vec<u8>,
-    /// True if it ends with a line feed; the last line of a truncated file does not.
-    pub(super) ended: bool,
-}
-
-/// A step with its whole reply; the longest reply of a model has some hundred thousand bytes.
-pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
-
-/// The number of bytes of a stored row's length.
 const LENGTH: usize = size_of::<u32>();
 
-/// The most bytes that a compressed file may inflate to.
 const fn most_inflated(bytes: u64) -> Limit {
     Limit::in_proportion("bytes inflated from a file of its size", 64 << 20, 96, bytes)
 }
@@ -111,7 +96,7 @@ impl Text {
         let mut head = Vec::new();
         self.reader.by_ref().take(HEAD).read_to_end(&mut head).map_err(ImportError::read(&self.name))?;
         self.rewind()?;
-        Ok(Format::of(&self.name, &head))
+        Ok(Format::detect(&self.name, &head))
     }
 
     /// The rows of a folder as lines of flat steps, in a temporary file; `None` if it is not a data set of `LeRobot`.
@@ -245,7 +230,6 @@ impl Text {
         Ok(bytes)
     }
 
-    /// The values of a line or stored row.
     pub(super) fn members(&self, bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
         if self.source.is_some() { line::of_record(bytes) } else { line::members(bytes, ended) }
     }

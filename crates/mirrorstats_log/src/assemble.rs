@@ -75,7 +75,6 @@ pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result
     })
 }
 
-/// Replaces the log at `out` by one with this recording and the episodes that `add` writes.
 fn replaced(
     file: NewFile,
     out: &Path,

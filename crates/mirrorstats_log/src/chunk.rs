@@ -15,7 +15,6 @@ use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
 /// The longest record of a log, chunks included; longer ones are damage.
 pub(super) const LONGEST: usize = 1 << 30;
 
-/// The size of an opcode and a length.
 pub(super) const FRAME: usize = 9;
 
 /// The budgets for unpacking a log, and for searching it for chunks after damage.

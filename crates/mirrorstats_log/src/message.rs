@@ -66,7 +66,7 @@ pub struct NoAction {
 }
 
 impl Decision {
-    pub fn of(t: i32, step: &Step) -> Self {
+    pub fn from_step(t: i32, step: &Step) -> Self {
         let Step { action, self_color, selected_cube, mirror_visible, extra } = step.clone();
         let action = action.map(|action| action.name().to_owned());
         let others = extra.answers.iter().map(|(name, answered)| (name.clone(), json!(answered))).collect();
@@ -104,7 +104,7 @@ mod tests {
         #[test]
         fn numbers_round_trip_exactly(cost in 0.0..10.0_f64, x in -5.0..5.0_f32) {
             let extra = Extra { cost_usd: Some(cost), pose_x: Some(x), ..Extra::default() };
-            let row = Decision::of(1, &Step { extra, ..Step::default() });
+            let row = Decision::from_step(1, &Step { extra, ..Step::default() });
             prop_assert_eq!(Decision::parse(json!(row).to_string().as_bytes()).unwrap(), row.clone());
             prop_assert_eq!(Decision::parse(&serde_json::to_vec(&row).unwrap()).unwrap(), row);
         }
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_key_that_is_no_column_is_refused() {
-        let mut row = json!(Decision::of(1, &Step::default()));
+        let mut row = json!(Decision::from_step(1, &Step::default()));
         assert!(Decision::parse(row.to_string().as_bytes()).is_ok());
         row["mirror_pixels"] = json!(1);
         let error = Decision::parse(row.to_string().as_bytes()).unwrap_err();

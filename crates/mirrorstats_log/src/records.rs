@@ -51,7 +51,7 @@ struct RecordHead {
 }
 
 impl RecordHead {
-    fn of(bytes: [u8; FRAME]) -> Self {
+    fn parse(bytes: [u8; FRAME]) -> Self {
         let [opcode, length @ ..] = bytes;
         Self { opcode, length: u64::from_le_bytes(length) }
     }
@@ -66,13 +66,13 @@ impl RecordHead {
 impl Records<BufReader<File>> {
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         let file = input::open(path).map_err(LogError::io("open", path))?;
-        Self::of(path, BufReader::new(file))
+        Self::from_reader(path, BufReader::new(file))
     }
 }
 
 impl<R: Read + Seek> Records<R> {
     /// The records of a log in these bytes; `path` is for error messages.
-    pub(super) fn of(path: &Path, bytes: R) -> Result<Self, LogError> {
+    pub(super) fn from_reader(path: &Path, bytes: R) -> Result<Self, LogError> {
         Self::new(bytes).map_err(LogError::io("read", path))?.ok_or_else(|| LogError::Foreign {
             file: path.display().to_string(),
             fault: "it does not begin as an MCAP file does".to_owned(),
@@ -200,7 +200,7 @@ impl<R: Read + Seek> Records<R> {
     fn frame(&mut self, at: u64) -> io::Result<Option<RecordHead>> {
         let bytes = self.read(at, FRAME)?;
         let behind = self.end.saturating_sub(at + FRAME as u64);
-        let frame = <[u8; FRAME]>::try_from(bytes).ok().map(RecordHead::of);
+        let frame = <[u8; FRAME]>::try_from(bytes).ok().map(RecordHead::parse);
         Ok(frame.filter(|frame| frame.is_plausible(behind)))
     }
 
@@ -227,7 +227,7 @@ impl<R: Read + Seek> Records<R> {
         loop {
             let window = self.read(start, WINDOW)?;
             for (at, bytes) in (start..).zip(window.windows(FRAME)) {
-                let frame = <[u8; FRAME]>::try_from(bytes).map(RecordHead::of);
+                let frame = <[u8; FRAME]>::try_from(bytes).map(RecordHead::parse);
                 if let Ok(frame) = frame
                     && self.is_landmark(at, frame)?
                 {

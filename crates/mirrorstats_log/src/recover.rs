@@ -70,12 +70,12 @@ impl Losses {
 
     pub fn first(&self) -> Option<String> {
         let episode = self.episodes.first().map(|lost| format!("the episode `{}`: {}", lost.episode_id, lost.reason));
-        let told = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();
+        let damage = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();
         let counts = || {
             let [chunks, rows] = [(self.damaged_chunks, "damaged chunk"), (self.stray_rows, "row")];
             format!("{}, {} of no episode", counted(chunks.0 as u64, chunks.1), counted(rows.0 as u64, rows.1))
         };
-        episode.or(told).or_else(|| self.is_any().then(counts))
+        episode.or(damage).or_else(|| self.is_any().then(counts))
     }
 }
 
@@ -86,8 +86,8 @@ pub fn recover(path: &Path) -> Result<Recovered, LogError> {
 
 /// Recovers the readable part of a log in these bytes; `path` is for error messages.
 pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, LogError> {
-    let mut records = Records::of(path, bytes)?;
-    let salvage = Salvage::of(&mut records).map_err(LogError::io("read", path))?;
+    let mut records = Records::from_reader(path, bytes)?;
+    let salvage = Salvage::read(&mut records).map_err(LogError::io("read", path))?;
     let is_ours = salvage.channels.values().any(|found| found == topic::EPISODE);
     if !is_ours && !salvage.result.losses.is_any() {
         let fault = "it has no topic /episode; `mirrorstats record` writes logs that do".to_owned();
@@ -104,7 +104,7 @@ struct Salvage {
 }
 
 impl Salvage {
-    fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
+    fn read(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
         // A chunk does not repeat the channels of earlier chunks, which may be damaged; the summary does.
         let topic =
             |record| if let Record::Channel(channel) = record { Some((channel.id, channel.topic)) } else { None };
@@ -297,7 +297,7 @@ pub fn ended(
     let fingerprint = fingerprint.or_else(|| head.fingerprint.clone());
     let episode = Episode { steps, fingerprint, episode_hash: None, ..head };
     let Some(stated) = hash else { return Ok(episode) };
-    let found = episode_hash::of(&episode);
+    let found = episode_hash::hash_of(&episode);
     if found == stated {
         return Ok(Episode { episode_hash: Some(stated), ..episode });
     }

@@ -137,7 +137,7 @@ impl EpisodeLog {
             episode_id: episode_id.clone(),
             steps: steps.len(),
             fingerprint: fingerprint.clone(),
-            episode_hash: Some(episode_hash::of(episode)),
+            episode_hash: Some(episode_hash::hash_of(episode)),
         };
         self.json(topic::EPISODE, time, &end)?;
         self.out.finish().map_err(LogError::writing(&self.path))?;

@@ -89,7 +89,9 @@ fn parted(own: &Episode, logged: &Episode) -> Option<String> {
         return Some(difference.to_string());
     }
     for (t, (own, logged)) in (1..).zip(own.steps.iter().zip(&logged.steps)) {
-        if let Some(difference) = difference(&json!(Decision::of(t, own)), &json!(Decision::of(t, logged))) {
+        if let Some(difference) =
+            difference(&json!(Decision::from_step(t, own)), &json!(Decision::from_step(t, logged)))
+        {
             return Some(format!("at t = {t}, {difference}"));
         }
     }

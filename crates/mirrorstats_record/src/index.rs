@@ -107,7 +107,7 @@ pub(crate) fn recording_of(path: &Path) -> Result<Value, StoreError> {
     let input = Input { name: path.display().to_string(), path: path.to_owned() };
     let unopened = || StoreError::io("read", path)(io::Error::other("the file cannot be opened as a trace"));
     let file = TraceFile::open(&input)
-        .map_err(|findings| TraceError::of(findings).map_or_else(unopened, StoreError::Trace))?;
+        .map_err(|findings| TraceError::from_findings(findings).map_or_else(unopened, StoreError::Trace))?;
     let text = file.metadata_value(RECORDING_KEY).unwrap_or("{}");
     Ok(serde_json::from_str(text).unwrap_or(Value::Null))
 }

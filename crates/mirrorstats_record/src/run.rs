@@ -266,7 +266,7 @@ impl Recording<'_> {
     ) -> Result<(), RecordError> {
         let fingerprint = self.store.fingerprint(key, played.model.as_deref(), stage.renderer().as_ref());
         let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
-        let episode = Episode { episode_hash: Some(episode_hash::of(&episode)), ..episode };
+        let episode = Episode { episode_hash: Some(episode_hash::hash_of(&episode)), ..episode };
         if let Some(log) = log {
             log.end(&episode).map_err(RecordError::fatal)?;
         }

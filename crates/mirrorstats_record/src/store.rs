@@ -96,7 +96,7 @@ impl Store {
         let metadata = TraceMetadata { recording: Some(recording), columns };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
-        Ok(writer.finish()?)
+        Ok(writer.commit()?)
     }
 
     /// Assembles the trace and the log of an experiment from its parts; does nothing without parts.

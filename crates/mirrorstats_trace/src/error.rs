@@ -38,20 +38,11 @@ fn more_findings(more: usize) -> String {
 }
 
 impl TraceError {
-    /// The same error; a failed write names the output at `path`.
-    #[must_use]
-    pub fn writing(self, path: &Path) -> Self {
-        match self {
-            Self::Write { source, .. } => Self::write(path, source),
-            other => other,
-        }
-    }
-
     pub fn write(file: impl AsRef<Path>, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Write { file: file.as_ref().display().to_string(), source: source.into() }
     }
 
-    pub fn of(findings: Vec<Finding>) -> Option<Self> {
+    pub fn from_findings(findings: Vec<Finding>) -> Option<Self> {
         let mut findings = findings.into_iter();
         let first = Box::new(findings.next()?);
         Some(Self::Finding { first, more: findings.len() })

@@ -138,7 +138,6 @@ pub struct FileInfo {
 /// The limit for the coverage of seeds and runs by model: seven models, five experiments and 20,000 runs have 700,000.
 const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
 
-/// The bytes of a cell, besides its names.
 const CELL: usize = 256;
 
 /// Whether to list episodes or only count them.
@@ -163,7 +162,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         threads,
         |batch| {
             let list = if listing == Listing::Episodes { list(set, &batch) } else { Vec::new() };
-            Ok::<_, TraceError>((Keys::of(&batch), ReplyCounts::of_batch(&batch), list))
+            Ok::<_, TraceError>((Keys::from_batch(&batch), ReplyCounts::of_batch(&batch), list))
         },
         |(keys, counts, list)| {
             tally.add(keys);
@@ -230,7 +229,7 @@ struct Keys {
 }
 
 impl Keys {
-    fn of(batch: &EpisodeBatch) -> Self {
+    fn from_batch(batch: &EpisodeBatch) -> Self {
         let [experiments, models] = ["experiment", "model"].map(|name| texts_of(batch, name));
         let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
         // A batch has few cells, so finding one is faster than hashing it.
@@ -283,7 +282,6 @@ fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
 #[derive(Default)]
 struct EpisodeTally {
     files: Vec<u64>,
-    /// The bytes of models and experiments, names included.
     bytes: u64,
     places: HashMap<(String, String), usize>,
     episodes: Vec<Vec<SeedRun>>,

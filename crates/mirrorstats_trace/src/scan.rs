@@ -13,10 +13,8 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Schema};
 use arrow::error::ArrowError;
 
-use super::diagnostic::Finding;
 use super::error::TraceError;
-use super::read::budget::most_episodes;
-use super::read::open::{TraceFile, TraceSet};
+use super::read::open::TraceSet;
 use super::read::parallel_scan::{Episodes, ScanEvent, pass};
 use super::read::projection::Layout;
 use super::schema::DeclaredColumn;
@@ -131,40 +129,30 @@ impl TraceSet {
         let mut prints = Prints::default();
         let mut spellings = Spellings::new(self.files());
         let mut summary = ScanSummary::default();
-        let most = most_episodes(self.files().iter().map(TraceFile::bytes).sum());
         let checked = |episodes: Episodes| {
-            let at = episodes.file;
-            let file = &self.files()[at];
+            let file = &self.files()[episodes.file];
             let mut faults = rules.check(file, &episodes);
             faults.extend(episode_hashes::check(file, &layout, &episodes));
             let fault = faults.into_iter().min_by_key(|fault| fault.row);
-            let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
-            let ids = hashes(&episodes, last);
-            let (count, steps) = (episodes.len(), episodes.columns[0].len());
+            let ids = hashes(&episodes, fault.as_ref().map_or(usize::MAX, |fault| fault.row));
+            let rows = (episodes.len() as u64, episodes.columns[0].len() as u64);
             let colors = other_names(&layout, &episodes);
             let result = match fault {
-                Some(fault) => Err(Box::new(fault.finding)),
-                None => Ok(whole(episodes).map_err(E::from).and_then(&work)),
+                Some(fault) => Err(TraceError::from(fault.finding).into()),
+                None => whole(episodes).map_err(E::from).and_then(&work),
             };
-            Checked { file: at, ids, count, steps, colors, result }
+            (ids, colors, rows, result)
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
-            let checked = match event {
+            let (ids, colors, (episodes, steps), result) = match event {
                 ScanEvent::Whole(checked) => checked,
                 ScanEvent::Fault(finding) => return Err(TraceError::from(finding).into()),
             };
-            prints.add(&checked.ids);
-            spellings.add(checked.colors);
-            summary.episodes += checked.count as u64;
-            summary.steps += checked.steps as u64;
-            // Each file also has its own budget, but many small files would have many.
-            most.check(summary.episodes).map_err(|exceeded| {
-                TraceError::from(Finding::over_budget(self.files()[checked.file].name(), &exceeded))
-            })?;
-            match checked.result {
-                Ok(result) => sink(result?),
-                Err(finding) => Err(TraceError::from(finding).into()),
-            }
+            prints.add(&ids);
+            spellings.add(colors);
+            summary.episodes += episodes;
+            summary.steps += steps;
+            sink(result?)
         });
         // A repeated id is found only at the end, though it precedes the event that ended the pass.
         prints.check(self.files(), &layout)?;
@@ -200,15 +188,6 @@ pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMa
         Ok(())
     })?;
     Ok(places)
-}
-
-struct Checked<T, E> {
-    file: usize,
-    ids: Vec<u64>,
-    count: usize,
-    steps: usize,
-    colors: Vec<String>,
-    result: Result<Result<T, E>, Box<Finding>>,
 }
 
 struct Shape<'a> {

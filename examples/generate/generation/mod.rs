@@ -103,5 +103,5 @@ fn write_file(study: &Study, numbers: &[u32], path: &Path) -> Result<(), Failure
     for number in numbers {
         writer.write(&study.episode((*number).into()))?;
     }
-    Ok(writer.finish()?)
+    Ok(writer.commit()?)
 }

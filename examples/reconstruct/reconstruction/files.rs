@@ -8,7 +8,7 @@ use std::path::Path;
 
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use serde_json::{Value, json};
 
 use super::contradiction::Contradiction;
@@ -76,7 +76,7 @@ pub fn write(folder: &Path, traces: &[Trace]) -> Result<(), TraceError> {
 pub fn bytes(trace: &Trace) -> Result<Vec<u8>, TraceError> {
     let columns = OptionalColumns::used_by(&trace.episodes);
     let metadata = TraceMetadata { recording: Some(trace.recording.clone()), columns };
-    let mut encoder = TraceEncoder::new(Vec::new(), &metadata)?;
+    let mut encoder = TraceWriter::new(Vec::new(), &metadata)?;
     for episode in &trace.episodes {
         encoder.write(episode)?;
     }

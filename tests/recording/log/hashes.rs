@@ -59,7 +59,7 @@ fn log_trace_and_rows_have_the_same_episode_hash() {
     let traced = merge::read(&desk.trace()).unwrap();
     assert_eq!((logged.len(), traced.len()), (3, 3));
     for rows in traced {
-        let hash = episode_hash::of(&rows.episode().unwrap());
+        let hash = episode_hash::hash_of(&rows.episode().unwrap());
         assert_eq!((rows.stated_hash().as_ref(), logged.get(&rows.episode_id)), (Some(&hash), Some(&hash)));
     }
 }

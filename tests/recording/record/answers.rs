@@ -91,7 +91,7 @@ fn answers_that_contradict_the_declaration_are_reported() {
         for episode in all {
             writer.write(episode).unwrap();
         }
-        writer.finish().unwrap();
+        writer.commit().unwrap();
     };
     all[0].steps[0].extra.answers.insert("answer_side".to_owned(), text("above"));
     write("altered.parquet", &all);

@@ -72,12 +72,12 @@ fn a_frame_with_other_contents_is_reported_as_different() {
     let digests: Vec<_> = all[0].steps.iter().map(|step| step.extra.frame_digest.clone().unwrap()).collect();
     assert_ne!(digests[0], digests[1]);
     all[0].steps[1].extra.frame_digest = Some(digests[0].clone());
-    all[0].episode_hash = Some(episode_hash::of(&all[0]));
+    all[0].episode_hash = Some(episode_hash::hash_of(&all[0]));
     let footer = recording(&path);
     let columns = OptionalColumns::recorded(&footer);
     let mut writer = TraceWriter::create(&path, &TraceMetadata { recording: Some(footer), columns }).unwrap();
     writer.write(&all[0]).unwrap();
-    writer.finish().unwrap();
+    writer.commit().unwrap();
     let replayed = run(bench.folder.path(), &["world", "replay", "runs/E1-mimic.parquet"]).ends(1);
     let said = &replayed.stdout;
     assert!(

@@ -36,7 +36,7 @@ fn another_threshold_agrees_with_the_recorded_counts() {
                 visible += usize::from(step.mirror_visible);
             }
             // Changed rows have another hash, which `validate` checks.
-            expected.episode_hash = Some(episode_hash::of(&expected));
+            expected.episode_hash = Some(episode_hash::hash_of(&expected));
             assert_eq!(*new, expected, "the threshold {threshold}");
         }
         seen.insert(visible);

@@ -14,7 +14,7 @@ use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::Projection;
 use mirrorstats_trace::validate::validate;
-use mirrorstats_trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
+use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use parquet::arrow::ArrowWriter;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
 
@@ -50,10 +50,10 @@ fn trace() -> Vec<u8> {
 
 fn trace_of(episodes: &[Episode]) -> Vec<u8> {
     let columns = OptionalColumns::used_by(episodes);
-    encoded(TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).unwrap(), episodes)
+    encoded(TraceWriter::new(Vec::new(), &TraceMetadata { recording: None, columns }).unwrap(), episodes)
 }
 
-fn encoded(mut encoder: TraceEncoder<Vec<u8>>, episodes: &[Episode]) -> Vec<u8> {
+fn encoded(mut encoder: TraceWriter<Vec<u8>>, episodes: &[Episode]) -> Vec<u8> {
     for episode in episodes {
         encoder.write(episode).unwrap();
     }

@@ -7,7 +7,7 @@ use ::csv::{ReaderBuilder, StringRecord};
 
 use super::RowSink;
 use crate::error::ImportError;
-use crate::line::LineValue;
+use crate::value::LineValue;
 use mirrorstats_exact::budget::Limit;
 
 const LONGEST_HEADER: Limit = Limit::new("bytes in the header of a table", 1 << 20);

@@ -8,7 +8,7 @@ use memchr::memmem;
 use serde::de::DeserializeOwned;
 
 use crate::cell;
-use crate::line::LineValue;
+use crate::value::LineValue;
 
 /// The mark before a number in a text. Unicode reserves this character for use inside of programs.
 pub(crate) const UNHELD: char = '\u{fdd0}';

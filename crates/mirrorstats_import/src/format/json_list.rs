@@ -4,12 +4,11 @@ use std::fmt;
 use std::fs::File;
 use std::io::{BufRead as _, BufReader};
 
-use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
-use serde_json::{Map, Value};
+use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 
 use super::RowSink;
 use crate::error::ImportError;
-use crate::line::BYTE_ORDER_MARK;
+use crate::line::{BYTE_ORDER_MARK, Pairs};
 
 pub(super) fn read(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
     let mut reader = BufReader::new(file);
@@ -52,42 +51,15 @@ impl<'de> Visitor<'de> for &mut List<'_, '_> {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
-        while let Some(object) = list.next_element_seed(UniqueKeys)? {
-            if let Err(error) = self.rows.add_object(&object) {
+        while let Some(object) = list.next_element::<Pairs>()? {
+            if let Some(key) = object.repeated() {
+                return Err(A::Error::custom(format_args!("the key {key:?} twice")));
+            }
+            if let Err(error) = self.rows.add(&object.row()) {
                 self.failed = Some(error);
                 return Err(A::Error::custom("a row failed"));
             }
         }
         Ok(())
-    }
-}
-
-/// An object with each key once.
-struct UniqueKeys;
-
-impl<'de> DeserializeSeed<'de> for UniqueKeys {
-    type Value = Map<String, Value>;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Self::Value, D::Error> {
-        deserializer.deserialize_map(self)
-    }
-}
-
-impl<'de> Visitor<'de> for UniqueKeys {
-    type Value = Map<String, Value>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("an object, one step")
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-        let mut object = Map::new();
-        while let Some((key, value)) = map.next_entry::<String, Value>()? {
-            if object.contains_key(&key) {
-                return Err(A::Error::custom(format_args!("the key {key:?} twice")));
-            }
-            object.insert(key, value);
-        }
-        Ok(object)
     }
 }

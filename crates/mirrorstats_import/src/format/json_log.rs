@@ -31,7 +31,6 @@ pub(super) fn read(json: impl Read, rows: &mut RowSink<'_>) -> Result<(), Import
     }
 }
 
-/// Visits the object of the log, or the list of its samples once `eval` was read.
 struct JsonLog<'r, 'm> {
     log: Option<Log>,
     status: Value,

@@ -18,10 +18,10 @@ use arrow::array::{Array as _, RecordBatch};
 use serde_json::{Map, Value};
 
 use super::error::{Fault, ImportError};
-use super::line::{self, BYTE_ORDER_MARK, LineValue};
+use super::line::{self, BYTE_ORDER_MARK, LONGEST_LINE, Line};
 use super::mapping::{MappedColumn, Mapping, Row};
 use super::table::Unreadable;
-use super::text::{LONGEST_LINE, Line};
+use super::value::LineValue;
 use json::PythonJson;
 use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
 
@@ -53,7 +53,6 @@ const fn most_rows(bytes: u64) -> Limit {
     Limit::new("bytes of rows of a log of its size, 64 more for each value", 128 << 20).and_beyond(1 << 20, 1024, bytes)
 }
 
-/// The most bytes of rows that an import stores between its passes.
 const fn most_stored(bytes: u64) -> Limit {
     Limit::in_proportion("bytes of rows in a file of its size", 512 << 20, 256, bytes)
 }
@@ -66,7 +65,7 @@ const COMPRESSED: [&str; 3] = [".gz", ".zst", ".zstd"];
 
 impl Format {
     /// The format by a file's first bytes, then by its name; JSON Lines if they show no other.
-    pub(super) fn of(name: &str, head: &[u8]) -> Self {
+    pub(super) fn detect(name: &str, head: &[u8]) -> Self {
         let name = name.to_ascii_lowercase();
         let name = COMPRESSED.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(&name);
         let text = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head).trim_ascii_start();
@@ -174,13 +173,11 @@ impl<'m> RowSink<'m> {
 
     /// A line of JSON. The blank lines before it count, so that rows have the numbers of their lines.
     pub(super) fn add_line(&mut self, line: &Line) -> Result<(), ImportError> {
-        line::members(&line.bytes, line.ended).map_err(|fault| fault.at(&line.place))?;
+        let pairs = line::pairs(&line.bytes, line.ended).map_err(|fault| fault.at(&line.place))?;
         while self.rows + 1 < line.place.line {
             self.write(&[])?;
         }
-        let object: Map<String, Value> = serde_json::from_slice(line.bytes.trim_ascii())
-            .map_err(|error| self.fault("", "strict JSON", error.to_string(), "correct the line"))?;
-        self.add_object(&object)
+        self.add(&pairs.row())
     }
 
     pub(super) fn fault(&self, part: &str, expected: &str, found: impl Into<String>, help: &str) -> ImportError {

@@ -53,7 +53,7 @@ impl Log {
     }
 
     pub fn done(&mut self, t: i32, row: &Step) -> Result<(), LogFault> {
-        Ok(self.file.decided(time(self.place, t), &Decision::of(t, row))?)
+        Ok(self.file.decided(time(self.place, t), &Decision::from_step(t, row))?)
     }
 
     pub fn end(self, episode: &Episode) -> Result<(), LogFault> {

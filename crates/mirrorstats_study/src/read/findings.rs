@@ -55,7 +55,7 @@ const SHOWN: usize = 10;
 
 /// The findings under these definitions. If `None`: under those that the traces carry, else those of the paper.
 pub fn findings(definitions: Option<&Path>, inputs: &[Input], threads: NonZeroUsize) -> Result<Validation, StudyError> {
-    let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());
+    let traces = TraceSet::from_files(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());
     let named = definitions.map_or(Path::new(DEFAULT_DEFINITIONS), |name| name);
     let definitions = match definitions.map_or_else(|| carried(&traces), |_| Ok(None))? {
         Some(carried) => carried.load(&schema_columns())?,

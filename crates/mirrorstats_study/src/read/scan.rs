@@ -74,7 +74,7 @@ impl Study {
         if let Source::Traces(traces) = &self.source {
             let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
             let losses_recorded = results.lost.is_some();
-            results.episodes.declared = Declared { unrecorded, losses_recorded, ..Declared::of(traces) };
+            results.episodes.declared = Declared { unrecorded, losses_recorded, ..Declared::from_traces(traces) };
         }
         let asked = self.question.labels();
         results.episodes.labels.retain(|label| asked.contains(&label.name) || says_something(label));

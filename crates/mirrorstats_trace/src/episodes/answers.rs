@@ -42,7 +42,7 @@ impl Answered {
     }
 
     /// The value of a cell; `None` if answers cannot have its type.
-    pub(crate) fn of(value: Value<'_>) -> Option<Self> {
+    pub(crate) fn from_value(value: Value<'_>) -> Option<Self> {
         match value {
             Value::Text(text) => Some(Self::Text(text.to_owned())),
             Value::Float(number) => Some(Self::Number(number)),

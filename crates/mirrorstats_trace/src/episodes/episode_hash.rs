@@ -22,7 +22,7 @@ pub(crate) const SELF_COLOR: &str = "self_color";
 pub(crate) const IDENTIFICATION: &str = "identification";
 
 /// The hash of an episode, 64 hexadecimal digits; ignores the field for the hash.
-pub fn of(episode: &Episode) -> String {
+pub fn hash_of(episode: &Episode) -> String {
     let (mut form, mut lines) = (CanonicalForm::new(), Vec::new());
     for column in columns().filter_map(schema::column) {
         let derived = |at: usize| column.name == SELF_COLOR && episode.steps[at].extra.identification.is_some();
@@ -99,7 +99,7 @@ pub(crate) fn same(a: Option<Value<'_>>, b: Option<Value<'_>>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{columns, of};
+    use super::{columns, hash_of};
     use crate::episodes::episode::{Action, Episode, Extra, Step};
     use mirrorstats_exact::hash::of_bytes;
 
@@ -139,28 +139,28 @@ mod tests {
             column run\n3 2\n\
             column seed\n3 -1\n\
             column self_color\n1 null\n2 3:red\n";
-        assert_eq!(of(&episode()), of_bytes(lines.as_bytes()));
+        assert_eq!(hash_of(&episode()), of_bytes(lines.as_bytes()));
     }
 
     #[test]
     fn derived_attributions_and_the_hash_itself_are_not_hashed() {
         let mut with_text = episode();
         with_text.steps[1].extra.identification = Some("red one".into());
-        let hash = of(&with_text);
+        let hash = hash_of(&with_text);
         with_text.steps[1].self_color = None;
         with_text.episode_hash = Some(hash.clone());
-        assert_eq!(of(&with_text), hash);
+        assert_eq!(hash_of(&with_text), hash);
         with_text.steps[2].self_color = None;
-        assert_ne!(of(&with_text), hash);
+        assert_ne!(hash_of(&with_text), hash);
     }
 
     #[test]
     fn every_value_and_its_row_are_hashed() {
-        let hash = of(&episode());
+        let hash = hash_of(&episode());
         let change = |change: fn(&mut Episode)| {
             let mut changed = episode();
             change(&mut changed);
-            of(&changed)
+            hash_of(&changed)
         };
         let changes: [fn(&mut Episode); 5] = [
             |episode| episode.steps.swap(0, 2),

@@ -8,7 +8,7 @@ use mirrorstats_exact::escape::visible;
 
 /// A sentence for each file with answers by a model that was not requested.
 pub fn by_others(files: &[TraceFile]) -> Vec<String> {
-    let told = |file: &TraceFile| {
+    let note = |file: &TraceFile| {
         let recording = file.recording();
         let others: Vec<String> = others(&recording).into_iter().map(|id| format!("`{}`", visible(id))).collect();
         let asked = visible(recording["agent"]["id"].as_str().unwrap_or_default());
@@ -16,7 +16,7 @@ pub fn by_others(files: &[TraceFile]) -> Vec<String> {
         (!others.is_empty())
             .then(|| format!("another model answered in {}: asked for `{asked}`, found {found}", file.name()))
     };
-    files.iter().filter_map(told).collect()
+    files.iter().filter_map(note).collect()
 }
 
 fn others(recording: &Value) -> Vec<&str> {

@@ -74,7 +74,7 @@ pub struct Declared {
 }
 
 impl Declared {
-    pub fn of(traces: &TraceSet) -> Self {
+    pub fn from_traces(traces: &TraceSet) -> Self {
         let recordings = traces.files().iter().map(|file| Self::of_recording(&file.recording()));
         recordings.reduce(Self::joined).unwrap_or_default()
     }

@@ -1,12 +1,9 @@
 //! Limits on the contents of a trace: rows, columns, episodes, the length of names and episodes. `parquet_pages` limits
 //! the inflated size of pages.
 
-use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
-
 use arrow::array::{Array as _, AsArray as _};
 
-use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
+use mirrorstats_exact::budget::{Exceeded, Limit};
 use mirrorstats_parquet_pages::Column;
 
 /// The longest name of an episode, model, condition or colour: names are in every row of the outputs.
@@ -46,29 +43,6 @@ pub(crate) const fn most_shown(bytes: u64) -> Limit {
     Limit::new("bytes of an episode that is shown", 48 << 20).and_beyond(1 << 20, 64, bytes)
 }
 
-/// The number of episodes read from a file so far. Repeated reads count once.
-#[derive(Debug)]
-pub(crate) struct EpisodeBudget {
-    episodes: Budget,
-    /// By row group, the end of the rows read so far.
-    read: Mutex<HashMap<usize, u64>>,
-}
-
-impl EpisodeBudget {
-    pub(crate) fn new(bytes: u64) -> Self {
-        Self { episodes: Budget::new(most_episodes(bytes)), read: Mutex::default() }
-    }
-
-    /// Counts complete episodes of a row group, whose last row is before `end`.
-    pub(crate) fn spend(&self, row_group: usize, end: u64, count: usize) -> Result<(), Exceeded> {
-        let mut read = self.read.lock().unwrap_or_else(PoisonError::into_inner);
-        let last = read.entry(row_group).or_default();
-        let is_new = end > *last;
-        *last = end.max(*last);
-        if is_new { self.episodes.spend(count as u64) } else { Ok(()) }
-    }
-}
-
 pub(crate) fn check_names(column: &Column) -> Result<(), Exceeded> {
     let entries = column.entries();
     let Some(texts) = entries.as_string_opt::<i32>() else { return Ok(()) };
@@ -86,14 +60,7 @@ mod tests {
     use arrow::array::StringArray;
     use mirrorstats_parquet_pages::{Column, Keys};
 
-    use super::{EpisodeBudget, check_names};
-
-    #[test]
-    fn episodes_are_counted_once_whatever_scans_them() {
-        let budget = EpisodeBudget::new(0);
-        assert!(budget.spend(0, 200_000, 200_000).is_ok() && budget.spend(0, 200_000, 200_000).is_ok());
-        assert!(budget.spend(1, 100_000, 100_000).is_ok() && budget.spend(1, 100_001, 1).is_err());
-    }
+    use super::check_names;
 
     #[test]
     fn long_names_are_refused() {

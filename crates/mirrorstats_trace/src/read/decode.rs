@@ -73,7 +73,6 @@ pub(crate) struct RowGroup<'a> {
     first: usize,
     at_a_time: usize,
     over: bool,
-    /// The values read of each column whose statistics the footer has.
     seen: Vec<Option<Seen>>,
 }
 
@@ -191,7 +190,6 @@ impl<'a> RowGroup<'a> {
         Ok(Some(rows))
     }
 
-    /// The footer's statistics of a column, in a file without checksums.
     fn described(&self, at: usize) -> Option<&Chunk> {
         let leaf = leaf(&self.readable.footer, root(self.file, self.layout, at)?)?;
         self.file.statistics.chunk(self.index, leaf)

@@ -1,6 +1,6 @@
 pub(crate) mod budget;
-mod checks;
 pub(crate) mod decode;
+pub(crate) mod entry_use;
 mod episode_index;
 pub mod flat;
 pub mod footer;
@@ -9,7 +9,6 @@ pub mod open;
 pub(crate) mod parallel_scan;
 pub(crate) mod projection;
 pub mod search;
+pub(crate) mod statistics;
 pub mod steps;
-
-pub(crate) use checks::statistics;
-pub use checks::verify;
+pub mod verify;

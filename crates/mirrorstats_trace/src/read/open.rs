@@ -6,7 +6,8 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Schema};
 
-pub use super::footer::trace_file::{FileColumn, TraceFile};
+pub use super::footer::columns::FileColumn;
+pub use super::footer::trace_file::TraceFile;
 use crate::beside::labels::Labels;
 use crate::error::TraceError;
 use crate::inputs::Input;
@@ -16,7 +17,6 @@ use crate::schema::{self, COLUMNS, Column, Domain, Kind};
 #[derive(Debug)]
 pub struct TraceSet {
     files: Arc<[TraceFile]>,
-    /// The labels of coders beside the traces, one value per episode.
     labels: Labels,
     label_columns: Vec<String>,
 }
@@ -45,12 +45,12 @@ impl TraceSet {
                 Err(findings) => faults.extend(findings),
             }
         }
-        let set = Self::of(files);
+        let set = Self::from_files(files);
         if set.domain() == Domain::Mirror {
             // Files of another domain among traces of the mirror's.
             faults.extend(set.files.iter().flat_map(TraceFile::strangeness));
         }
-        match TraceError::of(faults) {
+        match TraceError::from_findings(faults) {
             Some(error) => Err(error),
             None => Ok(set),
         }
@@ -72,7 +72,7 @@ impl TraceSet {
         self.domain().has(known) && (self.column(known.name).is_none() || self.declares(known.name))
     }
 
-    pub fn of(files: Vec<TraceFile>) -> Self {
+    pub fn from_files(files: Vec<TraceFile>) -> Self {
         Self { files: files.into(), labels: Labels::default(), label_columns: Vec::new() }
     }
 

@@ -14,16 +14,16 @@ use std::thread;
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
 
-use super::budget::{LONGEST_EPISODE, most_joined};
+use super::budget::{LONGEST_EPISODE, most_episodes, most_joined};
 use super::decode::{Ids, RowGroup, Rows};
 use super::episode_index::Ahead;
 use super::footer::trace_file::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout};
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
+use mirrorstats_exact::budget::Budget;
 use mirrorstats_parquet_pages::Column;
 
-/// Complete consecutive episodes of one file.
 #[derive(Clone, Debug)]
 pub(crate) struct Episodes {
     pub(crate) file: usize,
@@ -53,7 +53,6 @@ impl Episodes {
         (piece.row_group, piece.row + (row - piece.at))
     }
 
-    /// The id of the episode of a row; `None` for null.
     pub(crate) fn id(&self, row: usize) -> Option<&str> {
         self.columns[EPISODE_ID].text(row)
     }
@@ -74,7 +73,7 @@ pub(crate) enum ScanEvent<T> {
 enum ScanPart<T> {
     /// The first episode's rows, which may continue the row group before.
     Head(Vec<Rows>),
-    Whole(T),
+    Whole(T, usize),
     /// The last episode's rows, which may continue in the next row group.
     Tail(Vec<Rows>),
     Fault(Box<Finding>),
@@ -125,7 +124,8 @@ pub(crate) fn pass<T: Send, E: From<TraceError>>(
             }
         }
         drop(take);
-        Joiner { files, work, receive, open: Vec::new(), file: 0, failed: false }.run(&give, jobs, wanted + 2)
+        let budget = Budget::new(most_episodes(files.iter().map(TraceFile::bytes).sum()));
+        Joiner { files, work, receive, open: Vec::new(), budget, file: 0, failed: false }.run(&give, jobs, wanted + 2)
     })
 }
 
@@ -153,7 +153,6 @@ fn run_jobs<T>(
     }
 }
 
-/// Splits the rows of one row group into whole episodes and the two ends.
 struct Splitter<'a, T, W> {
     file: &'a TraceFile,
     layout: &'a Layout,
@@ -248,10 +247,8 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
     }
 
     fn send_whole(&self, episodes: Episodes) -> Result<(), Abandoned> {
-        if let Some(finding) = too_many(self.file, &episodes) {
-            return self.send(ScanPart::Fault(finding));
-        }
-        self.send(ScanPart::Whole((self.work)(episodes)))
+        let count = episodes.len();
+        self.send(ScanPart::Whole((self.work)(episodes), count))
     }
 
     fn send(&self, part: ScanPart<T>) -> Result<(), Abandoned> {
@@ -272,6 +269,8 @@ struct Joiner<'a, W, R> {
     work: &'a W,
     receive: R,
     open: Vec<Rows>,
+    /// The episodes of all files, of which there may be many small ones.
+    budget: Budget,
     file: usize,
     /// True after a fault of the file; the rest of it is ignored.
     failed: bool,
@@ -314,9 +313,9 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, ScanEvent<T>)
                 self.open.extend(rows);
                 too_long(&self.files[self.file], &self.open).map_or(Ok(()), |finding| self.fail(finding))
             }
-            ScanPart::Whole(result) => {
+            ScanPart::Whole(result, count) => {
                 self.close()?;
-                (self.receive)(self.file, ScanEvent::Whole(result))
+                self.pass_on(result, count)
             }
             ScanPart::Tail(rows) => {
                 self.close()?;
@@ -324,6 +323,13 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, ScanEvent<T>)
                 Ok(())
             }
             ScanPart::Fault(finding) => self.fail(finding),
+        }
+    }
+
+    fn pass_on(&mut self, result: T, count: usize) -> Result<(), E> {
+        match self.budget.spend(count as u64) {
+            Ok(()) => (self.receive)(self.file, ScanEvent::Whole(result)),
+            Err(exceeded) => self.fail(Box::new(Finding::over_budget(self.files[self.file].name(), &exceeded))),
         }
     }
 
@@ -339,7 +345,7 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, ScanEvent<T>)
             return Ok(());
         }
         match join(self.file, &open) {
-            Ok(episode) => (self.receive)(self.file, ScanEvent::Whole((self.work)(episode))),
+            Ok(episode) => self.pass_on((self.work)(episode), 1),
             Err(why) => self.fail(unjoined(&self.files[self.file], &open, why)),
         }
     }
@@ -352,13 +358,6 @@ fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
     let checked = LONGEST_EPISODE.check(steps as u64).and_then(|()| most_joined(file.bytes()).check(values as u64));
     let finding = Finding::over_budget(file.name(), &checked.err()?).in_row_group(first.row_group);
     Some(Box::new(finding))
-}
-
-fn too_many(file: &TraceFile, episodes: &Episodes) -> Option<Box<Finding>> {
-    let (piece, rows) = (episodes.pieces.last()?, *episodes.offsets.last()?);
-    let end = (piece.row + rows - piece.at) as u64;
-    let exceeded = file.episodes.spend(piece.row_group, end, episodes.offsets.len() - 1).err()?;
-    Some(Box::new(Finding::over_budget(file.name(), &exceeded).in_row_group(piece.row_group)))
 }
 
 fn join(file: usize, parts: &[Rows]) -> Result<Episodes, String> {

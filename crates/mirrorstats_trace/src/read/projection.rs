@@ -11,7 +11,6 @@ pub(crate) const BODY_COLOR: &str = "body_color";
 pub(crate) const EPISODE_ID: usize = 0;
 pub(crate) const T: usize = 5;
 
-/// The columns of a pass: [`KEYS`], then the requested ones.
 #[derive(Clone, Debug)]
 pub(crate) struct Layout {
     pub(crate) columns: Vec<LayoutColumn>,

@@ -15,7 +15,6 @@ use crate::schema::{Domain, Kind};
 pub const SAID: [&str; 7] =
     ["reasoning", "reply", "view_description", "identification", "summary", "reply_fault", "reply_status"];
 
-/// The characters of an excerpt on either side of a match.
 const AROUND: usize = 40;
 
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -31,7 +31,6 @@ pub(crate) fn value_at(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
 /// The field behind a column at a step index (0-based); a field of the episode is the same at all steps.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Access {
-    /// The value; `None` for null.
     pub(crate) get: fn(&Episode, usize) -> Option<Value<'_>>,
     /// Sets the value. Returns false and changes nothing if the field cannot hold it.
     pub(crate) set: fn(&mut Episode, usize, Option<Value<'_>>) -> bool,

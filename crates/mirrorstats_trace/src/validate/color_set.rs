@@ -5,13 +5,13 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZeroUsize;
 
-use arrow::array::{Array as _, AsArray as _, StringArray};
-use arrow::datatypes::{ArrowNativeType, Int32Type};
+use arrow::array::AsArray as _;
 use indexmap::IndexSet;
 
 use crate::diagnostic::{Code, Finding};
 use crate::episodes::palette::Color;
 use crate::error::TraceError;
+use crate::read::entry_use::EntryUse;
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::{Episodes, ScanEvent, pass};
 use crate::read::projection::{Layout, T};
@@ -74,41 +74,13 @@ fn color_columns<'a>(
 }
 
 fn distinct(column: &Column) -> Vec<(&str, usize, u64)> {
-    match column {
-        Column::Flat(values) => {
-            let values = values.as_dictionary::<Int32Type>();
-            let keys = values.keys().iter().map(|key| key.map(ArrowNativeType::as_usize));
-            counted(values.values().as_string(), keys.enumerate().map(|(row, key)| (row, key, 1)))
-        }
-        Column::Keys(keyed) => {
-            let keys = keyed.keys().iter().map(|key| key.map(usize::from));
-            counted(keyed.values().as_string(), keys.enumerate().map(|(row, key)| (row, key, 1)))
-        }
-        Column::Runs(runs) => {
-            let values = runs.values().as_dictionary::<Int32Type>();
-            let starts: Vec<(usize, usize)> = runs.starts().collect();
-            let ends = starts.iter().skip(1).map(|(start, _)| *start).chain([column.len()]);
-            let rows = starts.iter().zip(ends).map(|((start, run), end)| {
-                let key = values.keys().is_valid(*run).then(|| values.keys().value(*run).as_usize());
-                (*start, key, (end - start) as u64)
-            });
-            counted(values.values().as_string(), rows)
-        }
-    }
-}
-
-fn counted(texts: &StringArray, rows: impl Iterator<Item = (usize, Option<usize>, u64)>) -> Vec<(&str, usize, u64)> {
-    let mut by_key: Vec<Option<(usize, u64)>> = vec![None; texts.len()];
-    for (row, key, count) in rows {
-        if let Some(key) = key {
-            by_key[key].get_or_insert((row, 0)).1 += count;
-        }
-    }
     // A text may have two keys.
     let mut by_text: BTreeMap<&str, (usize, u64)> = BTreeMap::new();
-    for (key, (row, count)) in by_key.into_iter().enumerate().filter_map(|(key, met)| Some((key, met?))) {
-        let met = by_text.entry(texts.value(key)).or_insert((row, 0));
-        *met = (met.0.min(row), met.1 + count);
+    if let Some(EntryUse { entries, used, .. }) = EntryUse::of_column(column) {
+        for (text, (row, count)) in entries.iter().zip(used).filter_map(|(text, used)| text.zip(used)) {
+            let met = by_text.entry(text).or_insert((row, 0));
+            *met = (met.0.min(row), met.1 + count);
+        }
     }
     by_text.into_iter().map(|(text, (row, count))| (text, row, count)).collect()
 }

@@ -39,9 +39,9 @@ impl Prints {
     /// Errors: the first episode, by file and row, that repeats the id of an earlier one.
     pub(crate) fn check(self, files: &[TraceFile], layout: &Layout) -> Result<(), TraceError> {
         let count = self.0.len();
-        let alike = repeated_numbers(self.0);
+        let shared = repeated_numbers(self.0);
         // Equal hashes nearly always mean equal ids.
-        if alike.is_empty() { Ok(()) } else { check_ids(files, layout, &alike, count) }
+        if shared.is_empty() { Ok(()) } else { check_ids(files, layout, &shared, count) }
     }
 }
 
@@ -51,7 +51,7 @@ fn repeated_numbers(mut numbers: Vec<u64>) -> HashSet<u64> {
 }
 
 /// Reads the first `count` episodes again, in file order, and compares the ids with one of these hashes.
-fn check_ids(files: &[TraceFile], layout: &Layout, alike: &HashSet<u64>, count: usize) -> Result<(), TraceError> {
+fn check_ids(files: &[TraceFile], layout: &Layout, shared: &HashSet<u64>, count: usize) -> Result<(), TraceError> {
     let (mut ids, mut left) = (SeenIds::default(), count);
     let name = |file: usize| files[file].name().to_owned();
     pass(files, layout, NonZeroUsize::MIN, &|episodes| starts(&episodes), |file, event| {
@@ -62,7 +62,7 @@ fn check_ids(files: &[TraceFile], layout: &Layout, alike: &HashSet<u64>, count: 
         };
         let counted = starts.len().min(left);
         left -= counted;
-        for start in starts.into_iter().take(counted).filter(|start| alike.contains(&hash(&start.id))) {
+        for start in starts.into_iter().take(counted).filter(|start| shared.contains(&hash(&start.id))) {
             if let Some(Located { finding, .. }) = ids.admit(start, file, name) {
                 return Err(finding.into());
             }

@@ -68,7 +68,7 @@ impl Validation {
     /// The error with the findings that are errors, the earliest first.
     pub fn errors(self) -> Result<(), TraceError> {
         let errors = self.findings.into_iter().filter(|finding| finding.severity == Severity::Error);
-        TraceError::of(errors.collect()).map_or(Ok(()), Err)
+        TraceError::from_findings(errors.collect()).map_or(Ok(()), Err)
     }
 
     pub fn count(&self, severity: Severity) -> usize {
@@ -116,7 +116,6 @@ pub fn validate(
     validate_as(inputs, Expected { experiments, ..Expected::default() }, threads)
 }
 
-/// The checks of one file so far.
 struct FileCheck {
     file: CheckedFile,
     findings: Vec<Finding>,
@@ -140,7 +139,7 @@ pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsi
         };
         checks.push(FileCheck { file: about, findings, replies: ReplyCounts::default() });
     }
-    let set = TraceSet::of(opened);
+    let set = TraceSet::from_files(opened);
     let known = expected.experiments.map(|known| with_declared(known, &set));
     let expected = Expected { experiments: known.as_deref(), ..expected };
     check_rows(&set, expected, threads, &places, &mut checks)?;
@@ -238,10 +237,10 @@ fn check_rows(
         let replies = statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at]));
         let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
         let rows = (episodes.len() as u64, episodes.columns[0].len() as u64);
-        (found, colors, starts(&episodes), alike(&episodes), replies, rows)
+        (found, colors, starts(&episodes), copy_keys(&episodes), replies, rows)
     };
     let (mut ids, mut tally) = (SeenIds::default(), Tally::new(set.files()));
-    let mut alike = HashMap::new();
+    let mut by_key = HashMap::new();
     pass(set.files(), &layout, threads, &work, |file, event| {
         let check = &mut checks[places[file]];
         match event {
@@ -252,7 +251,7 @@ fn check_rows(
             ScanEvent::Whole((found, colors, starts, keys, replies, (episodes, steps))) => {
                 tally.add(set.files(), file, colors);
                 for (key, id) in keys.into_iter().filter(|_| !expected.errors_alone) {
-                    alike.entry(key).or_insert_with(Vec::new).push((id, file));
+                    by_key.entry(key).or_insert_with(Vec::new).push((id, file));
                 }
                 check.file.episodes += episodes;
                 check.file.steps += steps;
@@ -262,14 +261,14 @@ fn check_rows(
         }
         Ok::<_, TraceError>(())
     })?;
-    for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, alike, threads)) {
+    for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, by_key, threads)) {
         checks[places[file]].findings.push(finding);
     }
     Ok(())
 }
 
 /// The ids of episodes, each with a hash of its model, experiment, seed, run and length, which copies share.
-fn alike(episodes: &Episodes) -> Vec<(u64, String)> {
+fn copy_keys(episodes: &Episodes) -> Vec<(u64, String)> {
     let key = |ends: &[usize]| {
         let (at, mut hasher) = (ends[0], DefaultHasher::new());
         episodes.columns[1..3].iter().for_each(|column| column.text(at).hash(&mut hasher));
@@ -281,8 +280,8 @@ fn alike(episodes: &Episodes) -> Vec<(u64, String)> {
 }
 
 /// The copies, each with its file. Unreadable files have other findings.
-fn copied(set: &TraceSet, alike: HashMap<u64, Vec<(String, usize)>>, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
-    let several = alike.into_values().filter(|episodes| episodes.len() > 1);
+fn copied(set: &TraceSet, by_key: HashMap<u64, Vec<(String, usize)>>, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
+    let several = by_key.into_values().filter(|episodes| episodes.len() > 1);
     let files: BTreeMap<String, usize> = several.flatten().collect();
     let found = copies(set, files.keys().cloned().collect(), threads).unwrap_or_default();
     let finding = |Copied { episode, of }: Copied| {

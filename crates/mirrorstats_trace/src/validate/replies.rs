@@ -2,16 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::sync::Arc;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, StringArray};
-use arrow::datatypes::Int32Type;
+use arrow::array::ArrayRef;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::read::entry_use::EntryUse;
 use crate::scan::EpisodeBatch;
 use crate::schema;
 use mirrorstats_exact::escape::visible;
-use mirrorstats_parquet_pages::Column;
+use mirrorstats_parquet_pages::{Column, Keys};
 
 pub const REPLY_STATUS: &str = "reply_status";
 const READ: [&str; 2] = ["ok", "repaired"];
@@ -53,34 +54,18 @@ impl ReplyCounts {
     }
 
     pub(crate) fn of_batch(batch: &EpisodeBatch) -> Self {
-        if let Some(texts) = batch.texts.iter().find(|texts| texts.name == REPLY_STATUS) {
-            return Self::of_keys(texts.keys.iter().flatten().map(usize::from), &texts.texts);
-        }
-        batch.steps.column_by_name(REPLY_STATUS).map_or_else(Self::default, Self::of_dictionary)
+        let texts = batch.texts.iter().find(|texts| texts.name == REPLY_STATUS);
+        let keyed = texts.and_then(|texts| Keys::new(texts.keys.clone(), Arc::new(texts.texts.clone())));
+        let flat = || Some(Column::Flat(ArrayRef::clone(batch.steps.column_by_name(REPLY_STATUS)?)));
+        keyed.map(Column::Keys).or_else(flat).map_or_else(Self::default, |column| Self::of_column(&column))
     }
 
     pub(crate) fn of_column(column: &Column) -> Self {
-        if let Some((keys, texts)) = column.byte_texts() {
-            return Self::of_keys(keys.iter().flatten().map(usize::from), texts);
-        }
-        // Rows that do not fit into memory are reported as a separate finding.
-        column.flat().map_or_else(|_| Self::default(), |rows| Self::of_dictionary(&rows))
-    }
-
-    fn of_dictionary(rows: &ArrayRef) -> Self {
-        let Some(rows) = rows.as_dictionary_opt::<Int32Type>() else { return Self::default() };
-        let keys = rows.keys().iter().flatten().filter_map(|key| usize::try_from(key).ok());
-        Self::of_keys(keys, rows.values().as_string())
-    }
-
-    fn of_keys(keys: impl Iterator<Item = usize>, texts: &StringArray) -> Self {
-        let mut rows = vec![0; texts.len()];
-        for key in keys {
-            rows[key] += 1;
-        }
         let mut counts = Self::default();
-        for (text, rows) in texts.iter().zip(rows) {
-            counts.add(text.unwrap_or_default(), rows);
+        if let Some(EntryUse { entries, used, .. }) = EntryUse::of_column(column) {
+            for (text, (_, rows)) in entries.iter().zip(used).filter_map(|(text, used)| text.zip(used)) {
+                counts.add(text, rows);
+            }
         }
         counts
     }

@@ -37,7 +37,7 @@ pub(crate) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     for name in answers::among(&names) {
         let values = rows.column_by_name(name).and_then(held);
         for (step, row) in episode.steps.iter_mut().zip(0..) {
-            let answered = values.as_ref().and_then(|values| Answered::of(value_at(values, row)?));
+            let answered = values.as_ref().and_then(|values| Answered::from_value(value_at(values, row)?));
             step.extra.answers.extend(answered.map(|answered| (name.to_owned(), answered)));
         }
     }
@@ -104,7 +104,6 @@ pub(crate) fn identity(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     Ok(episode)
 }
 
-/// The columns besides identity and time, in file order.
 pub(crate) fn own_columns(rows: &RecordBatch) -> Vec<OwnColumn> {
     let schema = rows.schema();
     let named = schema.fields().iter().zip(rows.columns()).filter(|(field, _)| !is_identity(field.name()));

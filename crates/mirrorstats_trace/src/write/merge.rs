@@ -87,7 +87,7 @@ impl EpisodeRows {
     }
 
     fn hashed(&self) -> Result<Self, TraceError> {
-        let hash = episode_hash::of(&self.episode().map_err(|fault| unreadable(&self.episode_id, fault.into()))?);
+        let hash = episode_hash::hash_of(&self.episode().map_err(|fault| unreadable(&self.episode_id, fault.into()))?);
         let about = schema::column(EPISODE_HASH).expect("the schema has the column");
         let hash: ArrayRef = Arc::new(StringArray::from(vec![hash; self.len()]));
         let (mut fields, mut arrays) = (self.rows.schema().fields().to_vec(), self.rows.columns().to_vec());
@@ -252,7 +252,7 @@ pub fn write_in(
     episodes: &[EpisodeRows],
 ) -> Result<(), TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::write(path, source);
-    let episodes = alike(episodes)?;
+    let episodes = all_hashed(episodes)?;
     let Some(first) = episodes.first() else { return Err(failed("there is no episode to write".into())) };
     let schema = first.rows.schema();
     if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {
@@ -267,7 +267,7 @@ pub fn write_in(
     file.commit().map_err(|error| failed(error.into()))
 }
 
-fn alike(episodes: &[EpisodeRows]) -> Result<Cow<'_, [EpisodeRows]>, TraceError> {
+fn all_hashed(episodes: &[EpisodeRows]) -> Result<Cow<'_, [EpisodeRows]>, TraceError> {
     let has_hash = |episode: &EpisodeRows| episode.rows.column_by_name(EPISODE_HASH).is_some();
     if episodes.iter().all(has_hash) || !episodes.iter().any(has_hash) {
         return Ok(Cow::Borrowed(episodes));

@@ -14,8 +14,6 @@ use std::collections::{BTreeMap, HashSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use parquet::errors::ParquetError;
-
 use self::row_groups::{Gathered, RowGroups};
 use super::episodes::answers::{self, Answered, is_answer};
 use super::episodes::episode::Episode;
@@ -45,10 +43,10 @@ impl OptionalColumns {
     pub const NONE: Self = Self { given: Vec::new(), absent: Vec::new() };
 
     pub fn all() -> Self {
-        Self::of(COLUMNS.iter().filter(|column| !column.required))
+        Self::from_columns(COLUMNS.iter().filter(|column| !column.required))
     }
 
-    fn of(given: impl Iterator<Item = &'static Column>) -> Self {
+    fn from_columns(given: impl Iterator<Item = &'static Column>) -> Self {
         Self { given: given.collect(), absent: Vec::new() }
     }
 
@@ -82,12 +80,12 @@ impl OptionalColumns {
         };
         let absent = of_some_tasks().filter(|name| is_there(&experiment["absent"], name));
         let given = Self::all().given.into_iter().filter(|column| is_given(column.name));
-        Self { absent: absent.collect(), ..Self::of(given.chain(answers::columns(experiment))) }
+        Self { absent: absent.collect(), ..Self::from_columns(given.chain(answers::columns(experiment))) }
     }
 
     /// The columns of these names; `None` if one is not an optional column of the schema.
     pub fn named(names: &[&str]) -> Option<Self> {
-        let columns = Self::of(Self::all().given.into_iter().filter(|column| names.contains(&column.name)));
+        let columns = Self::from_columns(Self::all().given.into_iter().filter(|column| names.contains(&column.name)));
         names.iter().all(|name| columns.given.iter().any(|column| column.name == *name)).then_some(columns)
     }
 
@@ -102,7 +100,7 @@ impl OptionalColumns {
             used.extend(found);
             unused = rest;
         }
-        Self::of(COLUMNS.iter().filter(|column| used.contains(column)).chain(answered.into_values()))
+        Self::from_columns(COLUMNS.iter().filter(|column| used.contains(column)).chain(answered.into_values()))
     }
 
     fn split(&self) -> (Vec<&'static Column>, Vec<&'static Column>) {
@@ -115,7 +113,10 @@ impl OptionalColumns {
     }
 }
 
-pub struct TraceEncoder<W: Write + Send> {
+/// Writes a trace, to a file that appears under its name with [`commit`](TraceWriter::commit), or to any other output.
+pub struct TraceWriter<W: Write + Send> {
+    /// The name of the output in errors.
+    path: PathBuf,
     file: RowGroups<W>,
     columns: Vec<&'static Column>,
     gathered: Gathered,
@@ -124,15 +125,19 @@ pub struct TraceEncoder<W: Write + Send> {
     seen: HashSet<String>,
 }
 
-impl<W: Write + Send> TraceEncoder<W> {
+impl<W: Write + Send> TraceWriter<W> {
     pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        Self::named(Path::new("stream"), out, metadata)
+    }
+
+    fn named(path: &Path, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let recording = metadata.recording.as_ref().unwrap_or(&serde_json::Value::Null);
-        let palette = DeclaredPalette::of("stream", recording).map_err(|finding| *finding)?.palette;
+        let palette = DeclaredPalette::from_recording("stream", recording).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
         let recording = metadata.recording.as_ref();
-        let file = RowGroups::new(out, &gathered.layout, recording).map_err(failed)?;
-        Ok(Self { file, columns, gathered, undeclared, palette, seen: HashSet::new() })
+        let file = RowGroups::new(out, &gathered.layout, recording).map_err(|error| TraceError::write(path, error))?;
+        Ok(Self { path: path.to_owned(), file, columns, gathered, undeclared, palette, seen: HashSet::new() })
     }
 
     /// Adds an episode; t is 1, 2, ... in the order of its steps.
@@ -142,15 +147,28 @@ impl<W: Write + Send> TraceEncoder<W> {
             return refused(episode, "an id of its own".into(), "the id of an episode before it".into());
         }
         gather(&mut self.gathered, &self.columns, episode);
-        self.file.end_episode(&mut self.gathered).map_err(failed)
+        self.file.end_episode(&mut self.gathered).map_err(|error| TraceError::write(&self.path, error))
     }
 
     pub fn finish(self) -> Result<W, TraceError> {
-        self.file.finish(Some(self.gathered)).map_err(failed)
+        self.file.finish(Some(self.gathered)).map_err(|error| TraceError::write(self.path, error))
     }
 }
 
-/// The number in a column's name, as in `pane2_body_px`.
+impl TraceWriter<NewFile> {
+    /// Starts the trace for `path`, replacing an existing one; its folder must exist.
+    pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        let file = NewFile::create(path).map_err(|source| TraceError::write(path, source))?;
+        Self::named(path, file, metadata)
+    }
+
+    /// Completes the file, synchronises it with the disk and gives it its final name.
+    pub fn commit(self) -> Result<(), TraceError> {
+        let path = self.path.clone();
+        self.finish()?.commit().map_err(|source| TraceError::write(path, source))
+    }
+}
+
 fn numbered(column: &str, prefix: &str) -> Option<usize> {
     column.strip_prefix(prefix)?.split('_').next()?.parse().ok()
 }
@@ -169,7 +187,7 @@ fn shows_another_body(panes: &serde_json::Value) -> bool {
 fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {
     for (column, values) in columns.iter().zip(&mut gathered.columns) {
         let is_hash = column.name == EPISODE_HASH && episode.episode_hash.is_some();
-        let hash = is_hash.then(|| episode_hash::of(episode));
+        let hash = is_hash.then(|| episode_hash::hash_of(episode));
         for value in column.of_steps(episode) {
             let value = hash.as_deref().map(Value::Text).or(value);
             values.push(value).expect("a field gives values of its column's type");
@@ -244,36 +262,6 @@ fn refused(episode: &Episode, expected: String, found: String) -> Result<(), Tra
     Err(TraceError::Refused { episode: episode.episode_id.clone(), expected, found })
 }
 
-pub(super) fn failed(error: ParquetError) -> TraceError {
-    TraceError::write("stream", error)
-}
-
-/// Writes a trace file, which appears under its name when [`finish`](Self::finish) returns.
-pub struct TraceWriter {
-    encoder: TraceEncoder<NewFile>,
-    path: PathBuf,
-}
-
-impl TraceWriter {
-    /// Starts the trace for `path`, replacing an existing one; its folder must exist.
-    pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        let file = NewFile::create(path).map_err(|source| TraceError::write(path, source))?;
-        let encoder = TraceEncoder::new(file, metadata).map_err(|error| error.writing(path))?;
-        Ok(Self { encoder, path: path.to_owned() })
-    }
-
-    pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
-        self.encoder.write(episode).map_err(|error| error.writing(&self.path))
-    }
-
-    /// Completes the file, synchronises it with the disk and gives it its final name.
-    pub fn finish(self) -> Result<(), TraceError> {
-        let Self { encoder, path } = self;
-        let file = encoder.finish().map_err(|error| error.writing(&path))?;
-        file.commit().map_err(|source| TraceError::write(path, source))
-    }
-}
-
 /// Writes these episodes as one trace file with the optional columns that they use.
 pub fn write_episodes(
     path: &Path,
@@ -285,5 +273,5 @@ pub fn write_episodes(
     for episode in episodes {
         writer.write(episode)?;
     }
-    writer.finish()
+    writer.commit()
 }

@@ -21,7 +21,6 @@ use mirrorstats_parquet_pages::checksums::{self, CREATED_BY, Held};
 
 /// The number of rows after which a row group is closed, at the next end of an episode.
 const ROW_GROUP_ROWS: usize = 128 * 1024;
-/// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
 
 pub struct RowGroups<W: Write + Send> {

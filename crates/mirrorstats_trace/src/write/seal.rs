@@ -65,7 +65,7 @@ pub fn seal(trace: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
     let set = TraceSet::open(slice::from_ref(trace))?;
     sound(trace, threads)?;
     let new = NewFile::create(out).map_err(unwritable)?;
-    let new = copy_with_checksums(&set, new).map_err(|error| error.writing(out))?;
+    let new = copy_with_checksums(&set, new, out)?;
     let copy = Input { name: Input::new(out).name, path: new.temporary_path().to_owned() };
     let (episodes, steps) = sound(&copy, threads)?;
     compare(&set.files()[0], &TraceSet::open(slice::from_ref(&copy))?.files()[0])?;
@@ -82,12 +82,12 @@ fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError>
     checked.errors().map(|()| counts)
 }
 
-/// Writes the trace of a set's only file to `out` with checksums.
-fn copy_with_checksums<W: Write + Send>(set: &TraceSet, out: W) -> Result<W, TraceError> {
+/// Writes the trace of a set's only file to `out` with checksums; `target` is its name in errors.
+fn copy_with_checksums<W: Write + Send>(set: &TraceSet, out: W, target: &Path) -> Result<W, TraceError> {
     let file = &set.files()[0];
     // Copied columns get new checksums, which must not hide damaged bytes.
     verify_pages(set)?;
-    let failed = |error: ParquetError| TraceError::write(file.name(), error);
+    let failed = |error: ParquetError| TraceError::write(target, error);
     let metadata = file.footer_again(Extent::Whole)?.metadata;
     let properties = WriterProperties::builder()
         .set_key_value_metadata(Some(file.pairs.clone()))

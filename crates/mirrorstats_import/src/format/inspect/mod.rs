@@ -100,7 +100,6 @@ impl Log {
         Ok(())
     }
 
-    /// The columns that are the same in all rows of a sample.
     fn constants(
         &mut self,
         sample: &mut Value,

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::super::RowSink;
 use crate::error::ImportError;
-use crate::text::LONGEST_LINE;
+use crate::line::LONGEST_LINE;
 
 /// The second is of logs before 2025.
 const PROTOCOLS: [&str; 2] = ["attachment://", "tc://"];
@@ -18,7 +18,6 @@ const VALUE: u64 = 72;
 /// The copies for one row. All of them are part of its line, so that they have its limit too.
 pub(super) struct Copies<'s, 'm> {
     pub(super) rows: &'s RowSink<'m>,
-    /// The name of the sample in the file.
     pub(super) part: &'s str,
     attachments: &'s Value,
     bytes: u64,
@@ -29,7 +28,6 @@ impl<'s, 'm> Copies<'s, 'm> {
         Self { rows, part, attachments, bytes: 0 }
     }
 
-    /// Replaces references to attachments in the value.
     pub(super) fn resolve(&mut self, value: &mut Value) -> Result<(), ImportError> {
         match value {
             Value::String(text) => {

@@ -70,13 +70,11 @@ pub(crate) fn read_folder(folder: &Path, rows: &mut RowSink<'_>) -> Result<(), I
     Err(rows.fault("data", &format!("the frames of episode {episode}, as `meta/episodes` counts them"), found, help))
 }
 
-/// The bytes of the frames.
 pub(crate) fn bytes_of(folder: &Path) -> Result<u64, ImportError> {
     let bytes = |path: PathBuf| path.metadata().map(|about| about.len()).unwrap_or_default();
     Ok(below(folder, "data")?.into_iter().map(bytes).sum())
 }
 
-/// The values in `meta/info.json` that apply to all frames.
 fn constants(folder: &Path, rows: &RowSink<'_>) -> Result<Map<String, Value>, ImportError> {
     let path = folder.join(INFO);
     let text = input::text(&path, LARGEST_INFO).map_err(ImportError::read(&Input::new(&path).name))?;
@@ -93,7 +91,6 @@ fn constants(folder: &Path, rows: &RowSink<'_>) -> Result<Map<String, Value>, Im
     Ok(known.into_iter().filter(|(_, value)| !value.is_null()).collect())
 }
 
-/// A constant of the data set in each of its rows.
 fn repeated(value: &Value, rows: usize) -> ArrayRef {
     match (value.as_i64(), value.as_f64(), value.as_str()) {
         (Some(number), ..) => Arc::new(Int64Array::from_value(number, rows)),
@@ -151,7 +148,6 @@ fn below(folder: &Path, name: &str) -> Result<Vec<PathBuf>, ImportError> {
     Ok(files)
 }
 
-/// Reads each file; faults name the file.
 fn each_file(
     path: &Path,
     rows: &mut RowSink<'_>,

@@ -81,7 +81,7 @@ fn read_frames(
         let own = own.map(|(field, values)| (renamed(field.name()), ArrayRef::clone(values)));
         let mut columns = identity(&episodes, &frames, &rows.digits);
         if let Some(actions) = batch.column_by_name("action") {
-            let change = changes.of(&episodes, &frames, actions);
+            let change = changes.distances(&episodes, &frames, actions);
             columns.insert("action_change".to_owned(), Arc::new(change));
         }
         columns.extend(own);
@@ -97,7 +97,6 @@ fn renamed(column: &str) -> String {
     FRAME.iter().find(|(name, _)| *name == column).map_or(column, |(_, name)| name).to_owned()
 }
 
-/// A column of integers; `None` if there is none of the name.
 fn integers(table: &RecordBatch, name: &str) -> Option<Int64Array> {
     let column = table.column_by_name(name).filter(|column| column.data_type().is_integer())?;
     Some(cast(column, &DataType::Int64).ok()?.as_primitive::<Int64Type>().clone())
@@ -118,7 +117,7 @@ struct Changes {
 }
 
 impl Changes {
-    fn of(&mut self, episodes: &Int64Array, frames: &Int64Array, actions: &ArrayRef) -> Float64Array {
+    fn distances(&mut self, episodes: &Int64Array, frames: &Int64Array, actions: &ArrayRef) -> Float64Array {
         (0..actions.len()).map(|row| self.next(episodes, frames, actions, row)).collect()
     }
 

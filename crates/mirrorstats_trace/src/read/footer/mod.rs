@@ -1,7 +1,7 @@
 //! Reads footers: the positions of a file's columns, and its key-value metadata.
 
 pub(crate) mod bounds;
-pub(crate) mod folder_columns;
+pub(crate) mod columns;
 pub(crate) mod trace_file;
 
 use std::fs::File;
@@ -22,7 +22,6 @@ use mirrorstats_parquet_pages::{check_footer, footer_bytes};
 
 const MAGIC: [u8; 4] = *b"PAR1";
 const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
-/// A magic number at each end, and the footer's length.
 const SMALLEST: u64 = 12;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -17,14 +17,14 @@ use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 use serde_json::Value;
 
-use super::folder_columns::{FolderColumn, folder_columns};
+use super::columns::{FileColumn, FolderColumn, folder_columns};
 use super::{Extent, Footer, bounds, footer, plain};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::footers;
 use crate::footers::declared_experiment::{self, DeclaredExperiment};
 use crate::inputs::Input;
-use crate::read::budget::{EpisodeBudget, MOST_COLUMNS};
+use crate::read::budget::MOST_COLUMNS;
 use crate::read::statistics::DeclaredStatistics as Statistics;
 use crate::schema::colors::palette::{DeclaredPalette, Palette};
 use crate::schema::{self, COLUMNS, Column, DeclaredColumn, Domain, Kind};
@@ -46,26 +46,15 @@ pub struct TraceFile {
     pub(crate) colors: DeclaredPalette,
     experiments: Vec<DeclaredExperiment>,
     checksums: Checksums,
-    /// The footer's statistics, in a file without checksums.
     pub(crate) statistics: Statistics,
     footer: Mutex<Weak<Readable>>,
     pub(crate) expansion: Arc<Expansion>,
-    pub(crate) episodes: EpisodeBudget,
 }
 
 #[derive(Debug)]
 pub(crate) struct Readable {
     pub(crate) footer: ArrowReaderMetadata,
     pub(crate) chunks: ChunkChecksums,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct FileColumn {
-    pub name: String,
-    /// Its logical type; `None` for a column declared as all null, which is compatible with any type.
-    pub kind: Option<Kind>,
-    /// True for floats of 32 bits.
-    pub is_single: bool,
 }
 
 impl TraceFile {
@@ -90,11 +79,13 @@ impl TraceFile {
         let rows = metadata.row_groups().iter().map(rows_of).collect();
         // They are verified, long, and apply only to this file.
         pairs.retain(|pair| pair.key != schema::CHECKSUMS_KEY);
-        let colors = DeclaredPalette::of(&input.name, &recording).map_err(|f| vec![*f])?;
+        let colors = DeclaredPalette::from_recording(&input.name, &recording).map_err(|f| vec![*f])?;
         let experiments = declared_experiment::of_recording(&input.name, &recording).map_err(|f| vec![*f])?;
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
-        let whole = || footer(input, Extent::Whole).map(|footer| Statistics::of(&footer.metadata)).unwrap_or_default();
+        let whole = || {
+            footer(input, Extent::Whole).map(|footer| Statistics::from_metadata(&footer.metadata)).unwrap_or_default()
+        };
         let statistics = if checksums == Checksums::Present { Statistics::default() } else { whole() };
         Ok(Self {
             input: input.clone(),
@@ -110,7 +101,6 @@ impl TraceFile {
             statistics,
             footer: Mutex::default(),
             expansion: Arc::new(Expansion::new(bytes)),
-            episodes: EpisodeBudget::new(bytes),
         })
     }
 

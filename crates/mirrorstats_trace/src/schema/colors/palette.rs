@@ -41,7 +41,7 @@ pub(crate) struct DeclaredPalette {
 }
 
 impl DeclaredPalette {
-    pub(crate) fn of(file: &str, recording: &Value) -> Result<Self, Box<Finding>> {
+    pub(crate) fn from_recording(file: &str, recording: &Value) -> Result<Self, Box<Finding>> {
         let said = |key: &str| recording.get(key).filter(|value| !value.is_null());
         let palette = said("palette").map(|palette| Palette::read(file, palette)).transpose()?;
         Ok(Self { palette, is_of_world: said("scene_version").is_some() })
@@ -135,7 +135,7 @@ mod tests {
 
     #[test]
     fn a_declared_palette_is_read() {
-        let names = |text| DeclaredPalette::of("a.parquet", &recording(Some(text))).unwrap().palette;
+        let names = |text| DeclaredPalette::from_recording("a.parquet", &recording(Some(text))).unwrap().palette;
         assert_eq!(
             names(r#"{"world":{},"palette":["teal","dark red"]}"#),
             Some(Palette::new(["teal".into(), "dark red".into()]))
@@ -143,12 +143,12 @@ mod tests {
         for text in ["{}", r#"{"palette":null}"#, "no JSON", "7"] {
             assert_eq!(names(text), None, "{text}");
         }
-        assert_eq!(DeclaredPalette::of("a.parquet", &recording(None)).unwrap(), DeclaredPalette::default());
+        assert_eq!(DeclaredPalette::from_recording("a.parquet", &recording(None)).unwrap(), DeclaredPalette::default());
     }
 
     #[test]
     fn a_recording_of_this_world_has_the_colors_of_the_study() {
-        let has = |text, name| DeclaredPalette::of("a.parquet", &recording(Some(text))).unwrap().has(name);
+        let has = |text, name| DeclaredPalette::from_recording("a.parquet", &recording(Some(text))).unwrap().has(name);
         assert!(has(r#"{"scene_version":1}"#, "pink") && !has(r#"{"scene_version":1}"#, "teal"));
         assert!(!has(r#"{"kind":"import"}"#, "pink"));
         assert!(has(r#"{"scene_version":1,"palette":["teal"]}"#, "teal"));
@@ -180,7 +180,7 @@ mod tests {
     fn an_invalid_palette_is_refused() {
         for palette in ["[]", "7", "\"red\"", "[1]", "[\"Red\"]", "[\"none\"]", "[\"red \"]", "[\"\"]", "{\"red\":1}"] {
             let text = format!("{{\"palette\":{palette}}}");
-            let finding = DeclaredPalette::of("a.parquet", &recording(Some(&text))).unwrap_err();
+            let finding = DeclaredPalette::from_recording("a.parquet", &recording(Some(&text))).unwrap_err();
             assert_eq!(finding.code.name(), "invalid-metadata", "{palette}");
             assert!(finding.expected.contains("a list of lower-case names"), "{finding}");
         }

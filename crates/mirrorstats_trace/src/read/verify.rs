@@ -1,7 +1,7 @@
 //! Checks the stored pages of traces for engines that read files themselves.
 
-use super::super::footer::plain;
-use super::super::open::{TraceFile, TraceSet};
+use super::footer::plain;
+use super::open::{TraceFile, TraceSet};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;

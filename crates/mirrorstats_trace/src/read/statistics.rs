@@ -7,11 +7,12 @@
 use std::cmp::Ordering;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, UInt8Array};
-use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use parquet::basic::{ConvertedType, Encoding, LogicalType};
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 use parquet::file::statistics::Statistics;
 
+use super::entry_use::EntryUse;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_parquet_pages::{Column, Runs};
 
@@ -21,11 +22,9 @@ const CUT: usize = 60;
 #[derive(Debug, Default)]
 pub(crate) struct DeclaredStatistics(Vec<Vec<Option<Chunk>>>);
 
-/// A footer's statistics of the values of a chunk.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Chunk {
     nulls: Option<u64>,
-    /// The total bytes of the texts of all rows.
     bytes: Option<u64>,
     least: Option<Bound>,
     greatest: Option<Bound>,
@@ -40,9 +39,9 @@ enum Bound {
 }
 
 impl DeclaredStatistics {
-    pub(crate) fn of(metadata: &ParquetMetaData) -> Self {
+    pub(crate) fn from_metadata(metadata: &ParquetMetaData) -> Self {
         let groups = metadata.row_groups().iter();
-        Self(groups.map(|group| group.columns().iter().map(Chunk::of).collect()).collect())
+        Self(groups.map(|group| group.columns().iter().map(Chunk::from_chunk).collect()).collect())
     }
 
     pub(crate) fn chunk(&self, row_group: usize, column: usize) -> Option<&Chunk> {
@@ -51,7 +50,7 @@ impl DeclaredStatistics {
 }
 
 impl Chunk {
-    fn of(chunk: &ColumnChunkMetaData) -> Option<Self> {
+    fn from_chunk(chunk: &ColumnChunkMetaData) -> Option<Self> {
         // Arrow's C++ writer counts the stored bytes of delta-encoded texts here.
         let is_delta = chunk
             .encodings()
@@ -89,7 +88,6 @@ fn ends<T>(ends: [Option<&T>; 2], value: impl Fn(&T) -> Bound) -> [Option<Bound>
     ends.map(|end| end.map(&value))
 }
 
-/// The values read so far of a column of a row group.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seen {
     nulls: u64,
@@ -102,14 +100,17 @@ pub(crate) struct Seen {
 
 impl Seen {
     pub(crate) fn add(&mut self, column: &Column) {
-        match column {
-            Column::Flat(values) => self.flat(values),
-            Column::Runs(runs) => self.runs(runs),
-            Column::Keys(keys) => self.keys(keys.keys(), keys.values()),
+        match (EntryUse::of_column(column), column) {
+            (Some(texts), _) => self.texts(&texts),
+            (None, Column::Flat(values)) => {
+                self.nulls += values.null_count() as u64;
+                self.ends(values, 0..values.len());
+            }
+            (None, Column::Runs(runs)) => self.runs(runs),
+            (None, Column::Keys(keys)) => self.keys(keys.keys(), keys.values()),
         }
     }
 
-    /// The first mismatch: expected and found.
     pub(crate) fn fault(&self, declared: &Chunk) -> Option<(String, String)> {
         let nulls = declared.nulls.filter(|nulls| *nulls != self.nulls);
         if let Some(nulls) = nulls {
@@ -145,61 +146,30 @@ impl Seen {
         }
     }
 
-    fn flat(&mut self, values: &ArrayRef) {
-        if !matches!(values.data_type(), DataType::Dictionary(..)) {
-            self.nulls += values.null_count() as u64;
-            self.ends(values, 0..values.len());
-            return;
-        }
-        let texts = values.as_dictionary::<Int32Type>();
-        self.nulls += texts.keys().null_count() as u64;
-        let mut used = vec![0; texts.values().len()];
-        for key in texts.keys().iter().flatten() {
-            if let Some(used) = usize::try_from(key).ok().and_then(|key| used.get_mut(key)) {
-                *used += 1;
-            }
-        }
-        self.used(texts.values(), &used);
-    }
-
     fn runs(&mut self, runs: &Runs) {
         let starts: Vec<(usize, usize)> = runs.starts().collect();
         let ends = starts.iter().skip(1).map(|(start, _)| *start).chain([runs.rows()]);
-        let lengths: Vec<u64> = starts.iter().zip(ends).map(|((start, _), end)| (end - start) as u64).collect();
         let values = runs.values();
-        let nulls = starts.iter().zip(&lengths).filter(|((_, run), _)| values.is_null(*run));
-        self.nulls += nulls.map(|(_, length)| length).sum::<u64>();
-        match values.data_type() {
-            DataType::Dictionary(..) => {
-                let texts = values.as_dictionary::<Int32Type>();
-                let mut used = vec![0; texts.values().len()];
-                for ((_, run), length) in starts.iter().zip(&lengths) {
-                    texts.key(*run).and_then(|key| used.get_mut(key)).into_iter().for_each(|used| *used += length);
-                }
-                self.used(texts.values(), &used);
-            }
-            _ => self.ends(values, starts.iter().map(|(_, run)| *run)),
-        }
+        let nulls = starts.iter().zip(ends).filter(|((_, run), _)| values.is_null(*run));
+        self.nulls += nulls.map(|((start, _), end)| (end - start) as u64).sum::<u64>();
+        self.ends(values, starts.iter().map(|(_, run)| *run));
     }
 
     fn keys(&mut self, keys: &UInt8Array, values: &ArrayRef) {
         self.nulls += keys.null_count() as u64;
-        let mut used = [0; 256];
-        keys.iter().flatten().for_each(|key| used[usize::from(key)] += 1);
-        self.used(values, &used);
+        let mut used = [false; 256];
+        keys.iter().flatten().for_each(|key| used[usize::from(key)] = true);
+        self.ends(values, (0..values.len()).filter(|at| used.get(*at) == Some(&true)));
     }
 
-    fn used(&mut self, values: &ArrayRef, used: &[u64]) {
-        if let Some(texts) = values.as_string_opt::<i32>() {
-            let bytes =
-                (0..texts.len()).zip(used).map(|(at, rows)| u64::from(texts.value_length(at).cast_unsigned()) * rows);
-            self.bytes += bytes.sum::<u64>();
-            let entries =
-                texts.iter().flatten().map(str::as_bytes).chain(self.entries.iter().flatten().map(Vec::as_slice));
-            let ends = entries.clone().min().zip(entries.max());
-            self.entries = ends.map(|(least, greatest)| [least.to_vec(), greatest.to_vec()]);
-        }
-        self.ends(values, (0..values.len()).filter(|at| used.get(*at).is_some_and(|rows| *rows > 0)));
+    fn texts(&mut self, EntryUse { entries, used, nulls }: &EntryUse<'_>) {
+        self.nulls += nulls;
+        let bytes = |at: usize| u64::from(entries.value_length(at).cast_unsigned());
+        self.bytes += used.iter().enumerate().filter_map(|(at, used)| Some(bytes(at) * (*used)?.1)).sum::<u64>();
+        let all = entries.iter().flatten().map(str::as_bytes).chain(self.entries.iter().flatten().map(Vec::as_slice));
+        self.entries = all.clone().min().zip(all.max()).map(|(least, greatest)| [least.to_vec(), greatest.to_vec()]);
+        let present = entries.iter().zip(used).filter_map(|(text, used)| text.filter(|_| used.is_some()));
+        self.both(present, Ord::cmp, |text| Bound::Text(text.as_bytes().to_vec()));
     }
 
     fn ends(&mut self, values: &ArrayRef, rows: impl Iterator<Item = usize>) {
@@ -217,10 +187,6 @@ impl Seen {
                 let values = values.as_primitive::<Float64Type>();
                 let numbers = rows.map(|row| values.value(row)).filter(|value| !value.is_nan());
                 self.both(numbers, f64::total_cmp, Bound::Float);
-            }
-            DataType::Utf8 => {
-                let values = values.as_string::<i32>();
-                self.both(rows.map(|row| values.value(row)), Ord::cmp, |text| Bound::Text(text.as_bytes().to_vec()));
             }
             _ => {}
         }

@@ -1,6 +1,5 @@
-//! Columns in the names of a file's folders, as partitioned tables of Spark and others have them: `model=act/run=1`.
-//!
-//! Only files of other writers have them: a trace of this program describes itself.
+//! The columns of a file, and those in the names of its folders, as partitioned tables of Spark and others have them:
+//! `model=act/run=1`. Only files of other writers have the latter: a trace of this program describes itself.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,12 +9,20 @@ use arrow::compute::{cast, take};
 use arrow::datatypes::DataType;
 use arrow::error::ArrowError;
 
-use super::trace_file::FileColumn;
 use crate::diagnostic::{Code, Finding};
 use crate::inputs::folder_values;
 use crate::schema::{self, Kind};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_parquet_pages::Column;
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileColumn {
+    pub name: String,
+    /// Its logical type; `None` for a column declared as all null, which is compatible with any type.
+    pub kind: Option<Kind>,
+    /// True for floats of 32 bits.
+    pub is_single: bool,
+}
 
 #[derive(Clone, Debug)]
 pub struct FolderColumn {
@@ -49,7 +56,6 @@ impl FolderColumn {
         self.value.as_deref()
     }
 
-    /// The value in each of these rows.
     pub(crate) fn repeated(&self, held: &DataType, rows: usize) -> Result<ArrayRef, ArrowError> {
         let Some(value) = &self.value else { return Ok(new_null_array(held, rows)) };
         let one: ArrayRef = Arc::new(StringArray::from(vec![value.as_str()]));

@@ -1,2 +1,0 @@
-pub(crate) mod statistics;
-pub mod verify;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::columns::{Column, Fallback};
+use super::super::columns::{Column, Fallback, KnownColumn};
 use super::super::functions;
 use super::super::logical_plan::plan::{Arithmetic, Comparison, Constant, NodeId, Op};
 use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
@@ -101,8 +101,10 @@ impl Scope<'_, '_> {
         if name == "t" {
             return Some(self.unary(Op::Time, Type::Int, Level::Step));
         }
-        let Some(column) = binder.columns.get(name) else { return self.unknown_name(name, expr) };
-        match binder.columns.fallback_of(name) {
+        let Some(&KnownColumn { column, fallback, .. }) = binder.columns.known(name) else {
+            return self.unknown_name(name, expr);
+        };
+        match fallback {
             None => Some(self.unary(Op::Column(name.to_owned()), column.ty, column.level)),
             Some(fallback) => self.column_or(name, column, fallback),
         }

@@ -17,7 +17,7 @@ use super::answers::{changes, episode, list, map, overview};
 use super::found::Found;
 use super::logs::Opened;
 use super::snapshot::Together;
-use super::{Options, Snapshot, View, ViewError, film, page};
+use super::{Options, Snapshot, View, ViewError, page};
 use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
 use mirrorstats_exact::hash;
 use mirrorstats_exact::replace::{
@@ -251,9 +251,15 @@ fn said(told: &Value) -> Value {
 /// The same picture in fewer bytes: logs are written fast, a copy once. Rendered rooms have few colours and long runs,
 /// which a palette keeps and PNG filters break. Measured on frames of E1 to E5: 55 % of the bytes.
 fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
-    let (width, height, pixels) = film::pixels(frame).ok()?;
+    let mut reader = png::Decoder::new(io::Cursor::new(frame)).read_info().ok()?;
+    let mut pixels = vec![0; reader.output_buffer_size()?];
+    let info = reader.next_frame(&mut pixels).ok()?;
+    if info.color_type != png::ColorType::Rgb || info.bit_depth != png::BitDepth::Eight {
+        return None;
+    }
+    pixels.truncate(info.buffer_size());
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    let mut encoder = png::Encoder::new(&mut bytes, info.width, info.height);
     encoder.set_compression(png::Compression::Balanced);
     encoder.set_filter(png::Filter::NoFilter);
     if let Some((palette, places)) = indexed(&pixels) {
@@ -304,16 +310,8 @@ fn check_folder(folder: &Path) -> Result<(), ViewError> {
 fn old_files(root: &Path) -> Vec<PathBuf> {
     let mut old: BTreeSet<PathBuf> =
         ["index.html", "robots.txt", "NOTICE.txt", "assets/view.css", MARK].map(PathBuf::from).into();
-    let has_ending = |path: &PathBuf, ending: &str| path.extension().is_some_and(|found| found == ending);
-    old.extend(entries(root, Path::new("data")).filter(|path| has_ending(path, "js")));
-    for episode in entries(root, Path::new("frames")) {
-        old.extend(entries(root, &episode).filter(|path| has_ending(path, "png")));
-    }
+    let data = fs::read_dir(root.join("data")).into_iter().flatten().flatten();
+    let parts = data.map(|entry| Path::new("data").join(entry.file_name()));
+    old.extend(parts.filter(|path| path.extension().is_some_and(|ending| ending == "js")));
     old.into_iter().collect()
-}
-
-/// The entries of a folder, as paths relative to `root`.
-fn entries(root: &Path, inside: &Path) -> impl Iterator<Item = PathBuf> {
-    let found = fs::read_dir(root.join(inside)).into_iter().flatten().flatten();
-    found.map(move |entry| inside.join(entry.file_name()))
 }

@@ -10,13 +10,11 @@ use sqlparser::ast::{
 
 use super::names::column_name;
 use super::plan::{Planner, sort};
-use super::refused::{QueryError, unsupported};
+use super::refused::{QueryResult, unsupported};
 use super::relation::{Column, Found, Relation, find};
 use super::scope::{Key, Scope};
 use super::value::Value;
 use super::windows::{Order, integer, is_aggregate_call};
-
-type Answer<T> = Result<T, QueryError>;
 
 /// A column of the result.
 struct Item {
@@ -26,7 +24,7 @@ struct Item {
 }
 
 impl Planner<'_> {
-    pub(super) fn select(&mut self, select: &Select, orders: &[OrderByExpr]) -> Answer<Relation> {
+    pub(super) fn select(&mut self, select: &Select, orders: &[OrderByExpr]) -> QueryResult<Relation> {
         self.only_known_clauses(select)?;
         let from = self.from(&select.from)?;
         let mut scope = Scope::new(self, from.columns);
@@ -63,7 +61,7 @@ impl Planner<'_> {
         Ok(Relation { frame: sort(frame, &keys).select(chosen), columns })
     }
 
-    fn only_known_clauses(&self, select: &Select) -> Answer<()> {
+    fn only_known_clauses(&self, select: &Select) -> QueryResult<()> {
         let known = Select {
             distinct: None,
             projection: Vec::new(),
@@ -121,7 +119,7 @@ fn has_aggregate(node: &impl Visit) -> bool {
 
 impl Scope<'_, '_> {
     /// Reads GROUP BY. Returns false if rows are not grouped.
-    fn groups(&mut self, select: &Select, orders: &[OrderByExpr]) -> Answer<bool> {
+    fn groups(&mut self, select: &Select, orders: &[OrderByExpr]) -> QueryResult<bool> {
         let GroupByExpr::Expressions(parts, modifiers) = &select.group_by else {
             return Err(unsupported(self.source(), select.span(), "GROUP BY ALL"));
         };
@@ -148,7 +146,7 @@ impl Scope<'_, '_> {
     }
 
     /// The selected expression with a number, from 1.
-    fn position(&self, part: &Ast, at: i64, items: &[SelectItem]) -> Answer<Ast> {
+    fn position(&self, part: &Ast, at: i64, items: &[SelectItem]) -> QueryResult<Ast> {
         let item = usize::try_from(at).ok().and_then(|at| items.get(at.checked_sub(1)?));
         match item {
             Some(SelectItem::UnnamedExpr(expr) | SelectItem::ExprWithAlias { expr, .. }) => Ok(expr.clone()),
@@ -156,7 +154,7 @@ impl Scope<'_, '_> {
         }
     }
 
-    fn group_key(&mut self, key: &Ast) -> Answer<Key> {
+    fn group_key(&mut self, key: &Ast) -> QueryResult<Key> {
         let row = self.rows("GROUP BY", |scope| scope.exact(key))?;
         let name = self.planner.fresh();
         self.prepared.push(row.expr.clone().alias(name.as_str()));
@@ -173,7 +171,7 @@ impl Scope<'_, '_> {
         Ok(Key { ast: meant.unwrap_or_else(|| key.clone()), row, grouped })
     }
 
-    fn items(&mut self, projection: &[SelectItem]) -> Answer<Vec<Item>> {
+    fn items(&mut self, projection: &[SelectItem]) -> QueryResult<Vec<Item>> {
         let mut items = Vec::new();
         for item in projection {
             match item {
@@ -211,7 +209,7 @@ impl Scope<'_, '_> {
         item: &SelectItem,
         table: Option<&ObjectName>,
         options: &WildcardAdditionalOptions,
-    ) -> Answer<Vec<Item>> {
+    ) -> QueryResult<Vec<Item>> {
         let rest = WildcardAdditionalOptions { opt_exclude: None, ..options.clone() }.to_string();
         if !rest.is_empty() {
             return Err(unsupported(self.source(), item.span(), format!("`{item}`")));
@@ -266,7 +264,7 @@ impl Scope<'_, '_> {
         items: &[Item],
         columns: &[Column],
         distinct: bool,
-    ) -> Answer<(Vec<Expr>, Vec<Order>)> {
+    ) -> QueryResult<(Vec<Expr>, Vec<Order>)> {
         let (mut extra, mut keys) = (Vec::new(), Vec::new());
         for order in orders {
             let selected = match self.selected(&order.expr, items)? {
@@ -289,7 +287,7 @@ impl Scope<'_, '_> {
     }
 
     /// The selected column that ORDER BY means by a number, an alias or an equal expression.
-    fn selected(&self, key: &Ast, items: &[Item]) -> Answer<Option<usize>> {
+    fn selected(&self, key: &Ast, items: &[Item]) -> QueryResult<Option<usize>> {
         if let Some(at) = integer(key) {
             let position = usize::try_from(at).ok().and_then(|at| at.checked_sub(1)).filter(|at| *at < items.len());
             return match position {

@@ -147,6 +147,17 @@ impl Aggregate {
     }
 }
 
+mirrorstats_exact::names!(Comparison {
+    Equal: "=",
+    NotEqual: "<>",
+    Less: "<",
+    LessEqual: "<=",
+    Greater: ">",
+    GreaterEqual: ">="
+});
+
+mirrorstats_exact::names!(Arithmetic { Add: "+", Subtract: "-", Multiply: "*", Quotient: "div", Remainder: "%" });
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     pub name: String,

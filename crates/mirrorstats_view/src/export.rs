@@ -111,7 +111,7 @@ fn write_found(
     stage: TemporaryFolder,
     progress: Progress<'_>,
 ) -> Result<usize, ViewError> {
-    let snapshot = Snapshot::of_found(options, found, 0)?;
+    let snapshot = Snapshot::of_found(options, &found, 0)?;
     let mut files = Files {
         stage,
         folder: folder.to_owned(),
@@ -176,8 +176,8 @@ fn add_episodes(
             running.into_iter().map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
         });
         for ((at, _), made) in named.iter().zip(made) {
-            let (told, texts) = made?;
-            files.part(&format!("episode-{at}"), &told)?;
+            let (entry, texts) = made?;
+            files.part(&format!("episode-{at}"), &entry)?;
             said.insert(*at, texts);
         }
     }
@@ -191,13 +191,13 @@ type Made = Result<(Value, Value), ViewError>;
 pub fn episode_page(view: &View, id: &str) -> Result<String, ViewError> {
     let snapshot = view.newest();
     let opened = snapshot.episode(id)?;
-    let (mut told, _) = part_of(&snapshot, &opened, episode::scores(&snapshot, &opened)?)?;
-    told["siblings"] = json!([]);
+    let (mut entry, _) = part_of(&snapshot, &opened, episode::scores(&snapshot, &opened)?)?;
+    entry["siblings"] = json!([]);
     let everything = list::everything(&snapshot)?;
     let mut list = everything.clone();
     let rows = everything["rows"].as_array().into_iter().flatten().filter(|row| row["id"] == id);
     list["rows"] = rows.cloned().collect::<Vec<_>>().into();
-    let parts = json!({"study": overview::study(&snapshot), "list": list, "episode-0": told});
+    let parts = json!({"study": overview::study(&snapshot), "list": list, "episode-0": entry});
     let parts = parts.to_string().replace('<', "\\u003c");
     let script = format!("window.mirrorstatsParts = {parts};\n{}", page::classic());
     let (script_hash, style) = (hash::integrity_of_bytes(script.as_bytes()), page::style());
@@ -214,10 +214,10 @@ fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Resu
     let id = &opened.episode.episode_id;
     // The server's page reports an unreadable log; the export fails, since a copy needs its frames.
     let first = snapshot.logs.moment(opened, 1)?;
-    let mut told = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
-    told["siblings"] = list::siblings(snapshot, id).into();
-    let said = said(&told);
-    if told["log"] == true {
+    let mut entry = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
+    entry["siblings"] = list::siblings(snapshot, id).into();
+    let said = said(&entry);
+    if entry["log"] == true {
         let (mut images, mut places, mut map) = (Vec::new(), BTreeMap::new(), map::Map::default());
         let length = opened.episode.steps.len();
         let (mut hashes, mut of) = (vec![Value::Null; length], vec![Value::Null; length]);
@@ -231,17 +231,17 @@ fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Resu
             });
             (hashes[t - 1], of[t - 1]) = (hash.into(), at.into());
         })?;
-        told["map"] = map.told(length);
-        told["frame_hashes"] = hashes.into();
-        told["images"] = json!({"of": of, "png": images});
+        entry["map"] = map.into_json(length);
+        entry["frame_hashes"] = hashes.into();
+        entry["images"] = json!({"of": of, "png": images});
     }
-    Ok((told, said))
+    Ok((entry, said))
 }
 
 /// The columns that the server searches too.
-fn said(told: &Value) -> Value {
-    let steps = told["steps"].as_object().into_iter().flatten();
-    let is_mirror = told["own"] == false;
+fn said(entry: &Value) -> Value {
+    let steps = entry["steps"].as_object().into_iter().flatten();
+    let is_mirror = entry["own"] == false;
     let texts = steps.filter(|(name, _)| !is_mirror || mirrorstats_trace::read::search::SAID.contains(&name.as_str()));
     let texts = texts.filter(|(_, column)| column["is_number"] == false);
     let texts = texts.filter(|(_, column)| column["values"].as_array().into_iter().flatten().any(Value::is_string));

@@ -184,10 +184,6 @@ impl Plan {
         &self.nodes
     }
 
-    pub fn ids(&self) -> impl DoubleEndedIterator<Item = NodeId> + use<> {
-        (0..self.nodes.len()).map(NodeId)
-    }
-
     pub fn node(&self, id: NodeId) -> &Node {
         &self.nodes[id.0]
     }

@@ -235,7 +235,7 @@ impl Layout<'_> {
         }
     }
 
-    pub(super) fn operand(&self, id: NodeId) -> String {
+    fn operand(&self, id: NodeId) -> String {
         if self.plan.node(id).ty == Type::Bool { self.truth_as_int(id) } else { self.value(id) }
     }
 

@@ -187,21 +187,17 @@ impl PhysicalPlan {
     pub fn of(plans: &[&Plan]) -> Self {
         let mut physical = Self::default();
         for plan in plans {
-            physical.add_scores(plan);
+            let mut lowering = lower::Lowering::new(&mut physical, plan);
+            let metrics = plan.outputs.iter().map(|output| Metric {
+                name: output.name.clone(),
+                kind: output.kind,
+                step: lowering.values(output.node),
+            });
+            let metrics = metrics.collect();
+            let filter = plan.filter.map(|node| lowering.values(node));
+            physical.scores.push(Scores { metrics, filter });
         }
         physical
-    }
-
-    pub(crate) fn add_scores(&mut self, plan: &Plan) {
-        let mut lowering = lower::Lowering::new(self, plan);
-        let metrics = plan.outputs.iter().map(|output| Metric {
-            name: output.name.clone(),
-            kind: output.kind,
-            step: lowering.values(output.node),
-        });
-        let metrics = metrics.collect();
-        let filter = plan.filter.map(|node| lowering.values(node));
-        self.scores.push(Scores { metrics, filter });
     }
 
     /// Adds nodes of some definitions, each in its own shape; returns their steps.

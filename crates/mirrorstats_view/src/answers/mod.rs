@@ -24,7 +24,7 @@ pub(super) enum Answer {
 /// Answers a query of the page; `None` if the query is unknown.
 pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<Answer, ViewError>> {
     let snapshot = view.newest();
-    let told = match name {
+    let entry = match name {
         "frame" => return Some(frame(&snapshot, query).map(Answer::Png)),
         "file" => return Some(required(query, "id").and_then(|id| export::episode_page(view, id)).map(Answer::Page)),
         "live" => Ok(view.live()),
@@ -42,7 +42,7 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
         "changes" => changes::answer(&snapshot),
         _ => return None,
     };
-    Some(told.map(|value| Answer::Json(value.to_string().into_bytes())))
+    Some(entry.map(|value| Answer::Json(value.to_string().into_bytes())))
 }
 
 fn frame(snapshot: &Snapshot, query: &Query) -> Result<Vec<u8>, ViewError> {

@@ -47,15 +47,30 @@ pub struct Column {
 /// The columns by name: those of the schema in its order, then other columns of some traces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Columns {
-    schema: IndexMap<String, Column>,
-    own: IndexMap<String, Column>,
-    fallbacks: IndexMap<String, Fallback>,
-    values: IndexMap<String, Vec<String>>,
-    /// Columns of the schema that have a meaning only in the domain of the mirror.
-    of_mirror: Vec<String>,
-    /// Columns that hold only nulls in the traces, of no type.
-    null: Vec<String>,
-    stranger: Option<&'static str>,
+    known: IndexMap<String, KnownColumn>,
+    help: Option<&'static str>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KnownColumn {
+    pub column: Column,
+    pub origin: ColumnOrigin,
+    /// The only values, except null; any if empty.
+    pub values: Vec<String>,
+    /// The value in traces or rows that have none, if that is not null.
+    pub fallback: Option<Fallback>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColumnOrigin {
+    /// The meaning is the same in every trace.
+    Schema,
+    /// The same, but only in the domain of the mirror.
+    Mirror,
+    /// A column of some traces.
+    Own,
+    /// A column that holds only nulls in the traces: it fits any declared type, and is text otherwise.
+    OnlyNulls,
 }
 
 /// The value of a schema column if a trace or row has none.
@@ -66,110 +81,72 @@ pub struct Fallback {
     pub is_read: bool,
 }
 
+impl KnownColumn {
+    /// A column of any value.
+    pub const fn new(column: Column, origin: ColumnOrigin) -> Self {
+        Self { column, origin, values: Vec::new(), fallback: None }
+    }
+
+    pub(crate) const fn is_of_schema(&self) -> bool {
+        matches!(self.origin, ColumnOrigin::Schema | ColumnOrigin::Mirror)
+    }
+}
+
 impl Columns {
     /// The same columns; `help` is the advice for a name without similar ones.
     #[must_use]
     pub fn with_help(self, help: &'static str) -> Self {
-        Self { stranger: Some(help), ..self }
+        Self { help: Some(help), ..self }
     }
 
-    /// The same columns; these of the schema take only the listed values or null.
-    #[must_use]
-    pub fn with_values<N: Into<String>>(self, lists: impl IntoIterator<Item = (N, &'static [&'static str])>) -> Self {
-        let owned = |values: &[&str]| values.iter().map(|value| (*value).to_owned()).collect();
-        let values = lists.into_iter().map(|(name, values)| (name.into(), owned(values))).collect();
-        Self { values, ..self }
-    }
-
-    /// The same columns; these of the schema have a meaning only in the domain of the mirror.
-    #[must_use]
-    pub fn with_mirror<N: Into<String>>(self, names: impl IntoIterator<Item = N>) -> Self {
-        Self { of_mirror: names.into_iter().map(Into::into).collect(), ..self }
+    pub(crate) fn help(&self) -> &'static str {
+        self.help.unwrap_or("a column of your own is declared with [column.NAME] and `type`")
     }
 
     /// Removes the meaning of the mirror's columns: their names are free, and unknown unless the traces have own
     /// columns of these names.
     pub(crate) fn leave_mirror(&mut self) {
-        for name in std::mem::take(&mut self.of_mirror) {
-            self.forget(&name);
-        }
+        self.known.retain(|_, known| known.origin != ColumnOrigin::Mirror);
     }
 
-    /// The only values of a column, except null; `None` if any are possible.
-    pub fn values(&self, name: &str) -> Option<&[String]> {
-        self.values.get(name).map(Vec::as_slice)
-    }
-
-    pub fn help(&self) -> &'static str {
-        self.stranger.unwrap_or("a column of your own is declared with [column.NAME] and `type`")
-    }
-
-    pub fn get(&self, name: &str) -> Option<Column> {
-        self.schema.get(name).or_else(|| self.own.get(name)).copied()
-    }
-
-    /// The schema's column of this name, with the same meaning in every trace.
-    pub(crate) fn of_schema(&self, name: &str) -> Option<Column> {
-        self.schema.get(name).copied()
-    }
-
-    pub(crate) fn is_reserved(&self, name: &str) -> bool {
-        self.schema.contains_key(name)
-    }
-
-    /// Removes a column from the schema: these traces use its name for something else.
-    pub fn forget(&mut self, name: &str) {
-        self.schema.shift_remove(name);
-        self.values.shift_remove(name);
-    }
-
-    /// The value of the column in rows that have none; `None` if that is null.
-    pub(crate) fn fallback_of(&self, name: &str) -> Option<Fallback> {
-        self.fallbacks.get(name).copied().filter(|_| self.schema.contains_key(name))
-    }
-
-    /// Sets the value of a column of the schema in rows that have none.
-    pub fn set_fallback(&mut self, name: impl Into<String>, fallback: Fallback) {
-        self.fallbacks.insert(name.into(), fallback);
+    pub(crate) fn known(&self, name: &str) -> Option<&KnownColumn> {
+        self.known.get(name)
     }
 
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.schema.keys().chain(self.own.keys()).map(String::as_str)
+        self.known.keys().map(String::as_str)
     }
 
-    /// Adds a column with the same meaning for every reader of these traces, like those of the schema.
-    pub fn add_known(&mut self, name: impl Into<String>, column: Column) {
-        self.schema.insert(name.into(), column);
-    }
-
-    /// Sets the type and level of a column outside the schema; columns of the schema stay unchanged.
-    pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
+    /// Adds a column or replaces it; columns of the schema stay as they are.
+    pub fn add(&mut self, name: impl Into<String>, column: KnownColumn) {
         let name = name.into();
-        if !self.schema.contains_key(&name) {
-            self.own.insert(name, column);
+        if !self.known.get(&name).is_some_and(KnownColumn::is_of_schema) {
+            self.known.insert(name, column);
         }
     }
 
-    /// Sets a column outside the schema that holds only nulls: it fits any declared type, and is text otherwise.
-    pub fn set_null(&mut self, name: &str) {
-        self.set_own(name, Column { ty: Type::Text, level: Level::Step });
-        self.null.push(name.to_owned());
+    /// Removes a column: these traces use its name for something else.
+    pub fn forget(&mut self, name: &str) {
+        self.known.shift_remove(name);
     }
 
-    pub(crate) fn is_null(&self, name: &str) -> bool {
-        self.null.iter().any(|null| null == name)
-    }
-
-    pub(crate) fn set_own_values(&mut self, name: &str, values: &[String]) {
-        if self.own.contains_key(name) && !values.is_empty() {
-            self.values.insert(name.to_owned(), values.to_vec());
+    /// Sets for each column with a fallback whether some trace has it.
+    pub fn set_read(&mut self, is_read: impl Fn(&str) -> bool) {
+        for (name, known) in &mut self.known {
+            known.fallback.iter_mut().for_each(|fallback| fallback.is_read = is_read(name));
         }
+    }
+}
+
+impl<N: Into<String>> FromIterator<(N, KnownColumn)> for Columns {
+    fn from_iter<I: IntoIterator<Item = (N, KnownColumn)>>(columns: I) -> Self {
+        let known = columns.into_iter().map(|(name, column)| (name.into(), column)).collect();
+        Self { known, help: None }
     }
 }
 
 impl<N: Into<String>> FromIterator<(N, Column)> for Columns {
     fn from_iter<I: IntoIterator<Item = (N, Column)>>(columns: I) -> Self {
-        let schema = columns.into_iter().map(|(name, column)| (name.into(), column)).collect();
-        Self { schema, ..Self::default() }
+        columns.into_iter().map(|(name, column)| (name, KnownColumn::new(column, ColumnOrigin::Schema))).collect()
     }
 }

@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use super::bind::{self, Binding};
 use super::catalogs::catalog::{Better, Catalog, Experiment, Kind, Metric, by_order};
 use super::catalogs::measure;
-use super::columns::{Columns, Level, Type};
+use super::columns::{ColumnOrigin, Columns, KnownColumn, Level, Type};
 use super::file::{self, ColumnEntry, Document, FileError};
 use super::logical_plan::plan::{NodeId, Output, Plan};
 use mirrorstats_exact::hash;
@@ -216,19 +216,21 @@ fn advice(near: Option<&str>, known: &[String]) -> String {
 fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (name, ColumnEntry { place, column: declared, values, .. }) in &document.columns {
-        if name == "t" || columns.of_schema(name).is_some_and(|known| known != *declared) {
+        let known = columns.known(name);
+        if name == "t" || known.is_some_and(|known| known.is_of_schema() && known.column != *declared) {
             let message = format!("`{name}` is a column of every trace and cannot be declared as another");
             faults.push(
                 Fault::new(place.clone(), message).help("remove the declaration: `mirrorstats trace schema` has it"),
             );
-        } else if let Some(found) = columns.get(name).filter(|found| found.ty != declared.ty && !columns.is_null(name))
+        } else if let Some(found) = known.filter(|known| known.origin == ColumnOrigin::Own).map(|known| known.column.ty)
+            && found != declared.ty
         {
-            let (declared, found) = (declared.ty.name(), found.ty.name());
+            let (declared, found) = (declared.ty.name(), found.name());
             let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
             faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));
         } else {
-            columns.set_own(name.clone(), *declared);
-            columns.set_own_values(name, values);
+            let own = KnownColumn::new(*declared, ColumnOrigin::Own);
+            columns.add(name.clone(), KnownColumn { values: values.clone(), ..own });
         }
     }
     faults

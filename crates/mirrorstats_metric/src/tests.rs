@@ -2,22 +2,20 @@
 
 use mirrorstats_trace::schema::{self, COLUMNS, Kind};
 
-use crate::columns::{Column, Columns, Fallback, Level, Type};
+use crate::columns::{Column, ColumnOrigin, Columns, Fallback, KnownColumn, Level, Type};
 
 pub(crate) fn schema_columns() -> Columns {
-    let column = |column: &schema::Column| {
+    let known = |column: &schema::Column| {
         let level = if column.constant { Level::Episode } else { Level::Step };
-        type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
+        let known = KnownColumn {
+            column: Column { ty: type_of(column.stored.kind())?, level },
+            origin: ColumnOrigin::Schema,
+            values: column.values.iter().map(ToString::to_string).collect(),
+            fallback: column.default.map(|expression| Fallback { expression, is_read: column.required }),
+        };
+        Some((column.name, known))
     };
-    let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
-    let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
-    let mut columns = columns.with_values(lists);
-    for column in COLUMNS.iter() {
-        if let Some(expression) = column.default {
-            columns.set_fallback(column.name, Fallback { expression, is_read: column.required });
-        }
-    }
-    columns
+    COLUMNS.iter().filter(|column| column.name != "t").filter_map(known).collect()
 }
 
 fn type_of(kind: Kind) -> Option<Type> {

@@ -83,7 +83,7 @@ pub enum EvidenceError {
     #[error(transparent)]
     Score(#[from] ScoreError),
     #[error("no episode `{wanted}` among the {episodes} of the traces; {}", .near.as_ref().map_or_else(|| "`mirrorstats score` lists them".to_owned(), |near| format!("did you mean `{near}`?")))]
-    NoSuchEpisode { wanted: String, episodes: u64, near: Option<String> },
+    NoSuchEpisode { wanted: String, episodes: usize, near: Option<String> },
 }
 
 pub fn explain(
@@ -92,29 +92,10 @@ pub fn explain(
     episode_id: &str,
     threads: NonZeroUsize,
 ) -> Result<Evidence, EvidenceError> {
-    let reader = Reader::of(definitions);
-    check_work(traces, &reader.plan)?;
-    let projection = projection(traces, &[definitions], &reader.plan, &[])?;
-    let (mut found, mut names) = (None, Vec::new());
-    let summary = traces.scan(
-        &projection,
-        threads,
-        |batch| -> Result<_, ScoreError> {
-            let ids = episode_ids(&batch);
-            let position = ids.iter().position(|id| id == episode_id);
-            let evidence = position.map(|at| reader.episode(&batch, at, episode_id));
-            let evidence = evidence.transpose().map_err(|source| failed(traces, &batch, source))?;
-            Ok((evidence, ids))
-        },
-        |(evidence, ids)| {
-            found = found.take().or(evidence);
-            names.extend(ids);
-            Ok(())
-        },
-    )?;
-    found.ok_or_else(|| EvidenceError::NoSuchEpisode {
+    let (mut found, names) = explained(traces, definitions, &BTreeSet::from([episode_id.to_owned()]), threads)?;
+    found.remove(episode_id).ok_or_else(|| EvidenceError::NoSuchEpisode {
         wanted: episode_id.to_owned(),
-        episodes: summary.episodes,
+        episodes: names.len(),
         near: nearest(episode_id, names.iter().map(String::as_str)).map(str::to_owned),
     })
 }
@@ -126,25 +107,38 @@ pub fn explain_each(
     wanted: &BTreeSet<String>,
     threads: NonZeroUsize,
 ) -> Result<BTreeMap<String, Evidence>, ScoreError> {
+    Ok(explained(traces, definitions, wanted, threads)?.0)
+}
+
+/// The evidence of the wanted episodes, and the names of all.
+fn explained(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    wanted: &BTreeSet<String>,
+    threads: NonZeroUsize,
+) -> Result<(BTreeMap<String, Evidence>, Vec<String>), ScoreError> {
     let reader = Reader::of(definitions);
     check_work(traces, &reader.plan)?;
     let projection = projection(traces, &[definitions], &reader.plan, &[])?;
-    let mut found = BTreeMap::new();
+    let (mut found, mut names) = (BTreeMap::new(), Vec::new());
     traces.scan(
         &projection,
         threads,
-        |batch| -> Result<Vec<Evidence>, ScoreError> {
+        |batch| -> Result<_, ScoreError> {
             let ids = episode_ids(&batch);
             let wanted = ids.iter().enumerate().filter(|(_, id)| wanted.contains(*id));
-            let explained = wanted.map(|(at, id)| reader.episode(&batch, at, id));
-            explained.collect::<Result<_, _>>().map_err(|source| failed(traces, &batch, source))
+            let explained = wanted.map(|(at, id)| Ok((id.clone(), reader.episode(&batch, at, id)?)));
+            let explained =
+                explained.collect::<Result<Vec<_>, _>>().map_err(|source| failed(traces, &batch, source))?;
+            Ok((explained, ids))
         },
-        |explained| {
-            found.extend(explained.into_iter().map(|evidence| (evidence.episode_id.clone(), evidence)));
+        |(explained, ids)| {
+            found.extend(explained);
+            names.extend(ids);
             Ok(())
         },
     )?;
-    Ok(found)
+    Ok((found, names))
 }
 
 /// The plan for the requested metrics and every value that they are built from.
@@ -251,12 +245,9 @@ impl Reading<'_> {
             Op::Compare(_, a, b) | Op::Distinct(a, b) => Some([(*a, *b), (*b, *a)]),
             _ => None,
         });
-        let told = pairs.flatten().filter(|(_, other)| !matches!(self.plan().node(*other).op, Op::Constant(_)));
-        told.map(|(id, _)| self.unspread(id)).filter(|id| self.is_of_episode(*id)).collect()
-    }
-
-    fn unspread(&self, id: NodeId) -> NodeId {
-        if let Op::Spread(inner) = self.plan().node(id).op { inner } else { id }
+        let varying = pairs.flatten().filter(|(_, other)| !matches!(self.plan().node(*other).op, Op::Constant(_)));
+        let unspread = |(id, _)| if let Op::Spread(inner) = self.plan().node(id).op { inner } else { id };
+        varying.map(unspread).filter(|id| self.is_of_episode(*id)).collect()
     }
 
     fn is_of_episode(&self, id: NodeId) -> bool {
@@ -318,15 +309,11 @@ fn as_t(row: usize) -> i64 {
 }
 
 pub fn ranges(timesteps: &[i64]) -> String {
-    let mut runs: Vec<(i64, i64)> = Vec::new();
-    for &t in timesteps {
-        match runs.last_mut() {
-            Some((_, end)) if *end + 1 == t => *end = t,
-            _ => runs.push((t, t)),
-        }
-    }
-    let run = |&(start, end): &(i64, i64)| if start == end { start.to_string() } else { format!("{start}-{end}") };
-    runs.iter().map(run).collect::<Vec<_>>().join(", ")
+    let run = |run: &[i64]| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        one => one.first().map_or_else(String::new, ToString::to_string),
+    };
+    timesteps.chunk_by(|a, b| a + 1 == *b).map(run).collect::<Vec<_>>().join(", ")
 }
 
 fn decided(timesteps: &[i64]) -> String {

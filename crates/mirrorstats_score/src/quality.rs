@@ -7,21 +7,23 @@
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
-use arrow::array::{Array as _, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, StringArray};
+use arrow::array::{
+    Array as _, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Int32Array, StringArray, UInt8Array,
+};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::tables::builder::episode_ids;
+use super::tables::builder::{default_text, episode_ids};
 use super::tables::table::CONDITION;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::EpisodeBatch;
-use mirrorstats_trace::schema::{self, Column, Kind};
+use mirrorstats_trace::schema::{self, Kind};
 pub use mirrorstats_trace::validate::replies::statuses;
 use mirrorstats_trace::validate::replies::{REPLY_STATUS, ReplyCounts};
 
-const READ: [&str; 7] =
-    [REPLY_STATUS, "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
+const TEXTS: [&str; 3] = [REPLY_STATUS, "reply_repair", "reply_fault"];
+const NUMBERS: [&str; 4] = ["latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 /// The separator between the repairs of one reply.
 const AND: char = '+';
 /// Costs are summed in billionths of a dollar.
@@ -136,18 +138,18 @@ impl Quality {
             .map(|(latency, _)| *latency)
     }
 
-    pub fn merge(&mut self, other: &Self) {
+    fn merge(&mut self, other: Self) {
         self.episodes += other.episodes;
         self.steps += other.steps;
         self.lost = match (self.lost, other.lost) {
             (Some(one), Some(other)) => Some(one + other),
             (one, other) => one.or(other),
         };
-        add(&mut self.statuses, &other.statuses);
-        add(&mut self.repairs, &other.repairs);
-        add(&mut self.faults, &other.faults);
-        self.by_episode.extend(other.by_episode.iter().map(|(id, replies)| (id.clone(), *replies)));
-        add(&mut self.latencies, &other.latencies);
+        add(&mut self.statuses, other.statuses);
+        add(&mut self.repairs, other.repairs);
+        add(&mut self.faults, other.faults);
+        self.by_episode.extend(other.by_episode);
+        add(&mut self.latencies, other.latencies);
         for (total, more) in [
             (&mut self.prompt_tokens, other.prompt_tokens),
             (&mut self.completion_tokens, other.completion_tokens),
@@ -159,16 +161,16 @@ impl Quality {
     }
 }
 
-fn add<K: Ord + Clone>(counts: &mut BTreeMap<K, u64>, more: &BTreeMap<K, u64>) {
+fn add<K: Ord>(counts: &mut BTreeMap<K, u64>, more: impl IntoIterator<Item = (K, u64)>) {
     for (key, replies) in more {
-        *counts.entry(key.clone()).or_default() += replies;
+        *counts.entry(key).or_default() += replies;
     }
 }
 
 impl QualityByCell {
     pub fn merge(&mut self, other: Self) {
         for (key, quality) in other.0 {
-            self.0.entry(key).or_default().merge(&quality);
+            self.0.entry(key).or_default().merge(quality);
         }
     }
 
@@ -178,8 +180,7 @@ impl QualityByCell {
     }
 
     pub fn has_conditions(&self) -> bool {
-        let default = schema::column(CONDITION).and_then(Column::default_text);
-        self.0.keys().any(|key| Some(key.condition.as_str()) != default)
+        self.0.keys().any(|key| Some(key.condition.as_str()) != default_text(CONDITION))
     }
 
     pub fn is_recorded(&self) -> bool {
@@ -188,7 +189,7 @@ impl QualityByCell {
 
     pub fn whole(&self) -> Quality {
         let mut whole = Quality::default();
-        self.0.values().for_each(|quality| whole.merge(quality));
+        self.0.values().cloned().for_each(|quality| whole.merge(quality));
         whole
     }
 }
@@ -202,7 +203,7 @@ pub struct QualityReader {
 impl QualityReader {
     /// A reader of the columns that record replies in these traces. Skips columns whose type differs from the schema's.
     pub fn of(traces: &TraceSet) -> Self {
-        Self::of_columns(traces, &READ)
+        Self::of_columns(traces, TEXTS.iter().chain(&NUMBERS))
     }
 
     /// Like [`QualityReader::of`], for the statuses of replies alone.
@@ -210,12 +211,12 @@ impl QualityReader {
         Self::of_columns(traces, &[REPLY_STATUS])
     }
 
-    fn of_columns(traces: &TraceSet, names: &[&str]) -> Self {
-        let fits = |name: &&str| {
+    fn of_columns<'n>(traces: &TraceSet, names: impl IntoIterator<Item = &'n &'n str>) -> Self {
+        let fits = |name: &&&str| {
             let known = schema::column(name).map(|column| column.stored.kind());
             traces.declares(name) && traces.column(name).map(|column| column.kind) == known
         };
-        let columns = names.iter().copied().filter(fits).map(str::to_owned).collect();
+        let columns = names.into_iter().filter(fits).map(|name| (*name).to_owned()).collect();
         let has_condition =
             traces.declares(CONDITION) && traces.column(CONDITION).is_some_and(|c| c.kind == Kind::String);
         Self { columns, has_condition }
@@ -231,14 +232,14 @@ impl QualityReader {
 
     pub fn read(&self, batch: &EpisodeBatch, kept: Option<&BooleanArray>) -> QualityByCell {
         let mut cells = Cells::default();
-        let columns = Columns::of(batch);
+        let columns = ReplyColumns::of(batch);
         let keys = ["experiment", "model", CONDITION].map(|name| batch.episodes.column_by_name(name));
-        let ids = if columns.status.is_some() { episode_ids(batch) } else { Vec::new() };
+        let ids = if columns.texts[0].is_some() { episode_ids(batch) } else { Vec::new() };
         for (episode, rows) in batch.offsets.windows(2).enumerate() {
             if kept.is_some_and(|kept| !(kept.is_valid(episode) && kept.value(episode))) {
                 continue;
             }
-            let counts = cells.of(keys, episode);
+            let counts = cells.at(keys, episode);
             counts.rest.episodes += 1;
             counts.rest.steps += (rows[1] - rows[0]) as u64;
             if !self.columns.is_empty() {
@@ -260,25 +261,19 @@ struct Cells {
 
 #[derive(Default)]
 struct Counts {
-    statuses: Vec<u64>,
-    repairs: Vec<u64>,
-    faults: Vec<u64>,
+    texts: [Vec<u64>; 3],
     rest: Quality,
 }
 
 impl Cells {
-    fn of(&mut self, keys: [Option<&ArrayRef>; 3], episode: usize) -> &mut Counts {
-        let codes = keys.map(|column| {
-            let column = column?.as_dictionary_opt::<Int32Type>()?;
-            column.key(episode)
-        });
+    fn at(&mut self, keys: [Option<&ArrayRef>; 3], episode: usize) -> &mut Counts {
+        let codes = keys.map(|column| column?.as_dictionary_opt::<Int32Type>()?.key(episode));
         let at = *self.known.entry(codes).or_insert_with(|| {
             let [experiment, model, condition] = [0, 1, 2].map(|at| text(keys[at], codes[at]));
-            let default = || schema::column(CONDITION).and_then(Column::default_text).unwrap_or_default().to_owned();
             let key = CellKey {
-                experiment: experiment.unwrap_or_default(),
-                model: model.unwrap_or_default(),
-                condition: condition.unwrap_or_else(default),
+                experiment: experiment.unwrap_or_default().to_owned(),
+                model: model.unwrap_or_default().to_owned(),
+                condition: condition.or(default_text(CONDITION)).unwrap_or_default().to_owned(),
             };
             self.cells.push((key, Counts::default()));
             self.cells.len() - 1
@@ -286,88 +281,74 @@ impl Cells {
         &mut self.cells[at].1
     }
 
-    fn finish(self, columns: &Columns<'_>) -> QualityByCell {
+    fn finish(self, columns: &ReplyColumns<'_>) -> QualityByCell {
         let mut found = QualityByCell::default();
-        for (key, counts) in self.cells {
-            let mut quality = counts.rest;
-            for (status, replies) in named(columns.status.as_ref(), &counts.statuses) {
-                *quality.statuses.entry(status.to_owned()).or_default() += replies;
+        for (key, Counts { texts, rest: mut quality }) in self.cells {
+            let [statuses, repairs, faults] = [0, 1, 2].map(|at| named(columns.texts[at].as_ref(), &texts[at]));
+            add(&mut quality.statuses, statuses);
+            for (repairs, replies) in repairs {
+                let each = repairs.split(AND).filter(|repair| !repair.is_empty());
+                add(&mut quality.repairs, each.map(|repair| (repair.to_owned(), replies)));
             }
-            for (repairs, replies) in named(columns.repair.as_ref(), &counts.repairs) {
-                for repair in repairs.split(AND).filter(|repair| !repair.is_empty()) {
-                    *quality.repairs.entry(repair.to_owned()).or_default() += replies;
-                }
-            }
-            for (fault, replies) in named(columns.fault.as_ref(), &counts.faults) {
-                *quality.faults.entry(fault.to_owned()).or_default() += replies;
-            }
-            found.0.entry(key).or_default().merge(&quality);
+            add(&mut quality.faults, faults);
+            found.0.entry(key).or_default().merge(quality);
         }
         found
     }
 }
 
-fn text(column: Option<&ArrayRef>, code: Option<usize>) -> Option<String> {
+fn text(column: Option<&ArrayRef>, code: Option<usize>) -> Option<&str> {
     let texts = column?.as_dictionary_opt::<Int32Type>()?.values().as_string::<i32>();
-    code.map(|code| texts.value(code).to_owned())
+    code.map(|code| texts.value(code))
 }
 
-fn named<'a>(column: Option<&'a Coded<'a>>, counts: &[u64]) -> Vec<(&'a str, u64)> {
-    let texts = column.map(|column| column.texts);
+fn named(column: Option<&Coded<'_>>, counts: &[u64]) -> Vec<(String, u64)> {
     let all = counts.iter().enumerate().filter(|(_, count)| **count > 0);
-    all.filter_map(|(code, count)| Some((texts?.value(code), *count))).collect()
+    all.filter_map(|(code, count)| Some((column?.texts.value(code).to_owned(), *count))).collect()
 }
 
-struct Columns<'a> {
-    status: Option<Coded<'a>>,
-    repair: Option<Coded<'a>>,
-    fault: Option<Coded<'a>>,
-    latency: Option<&'a ArrayRef>,
-    prompt_tokens: Option<&'a ArrayRef>,
-    completion_tokens: Option<&'a ArrayRef>,
-    cost: Option<&'a ArrayRef>,
+/// The columns of [`TEXTS`] and [`NUMBERS`] in a batch.
+struct ReplyColumns<'a> {
+    texts: [Option<Coded<'a>>; 3],
+    numbers: [Option<&'a ArrayRef>; 4],
 }
 
-impl<'a> Columns<'a> {
+impl<'a> ReplyColumns<'a> {
     fn of(batch: &'a EpisodeBatch) -> Self {
-        let column = |name: &str| batch.steps.column_by_name(name);
-        Self {
-            status: Coded::of(batch, REPLY_STATUS),
-            repair: Coded::of(batch, "reply_repair"),
-            fault: Coded::of(batch, "reply_fault"),
-            latency: column("latency_ms"),
-            prompt_tokens: column("prompt_tokens"),
-            completion_tokens: column("completion_tokens"),
-            cost: column("cost_usd"),
-        }
+        let numbers = NUMBERS.map(|name| batch.steps.column_by_name(name));
+        Self { texts: TEXTS.map(|name| Coded::of(batch, name)), numbers }
     }
 
     fn replies(&self, rows: Range<usize>) -> Option<[u64; 2]> {
-        let status = self.status.as_ref()?;
+        let status = self.texts[0].as_ref()?;
         let codes = rows.filter_map(|row| status.code(row));
         Some(codes.fold([0; 2], |[unusable, all], code| {
             [unusable + u64::from(!ReplyCounts::is_read(status.texts.value(code))), all + 1]
         }))
     }
 
-    fn add(&self, row: usize, counts: &mut Counts) {
-        count(self.status.as_ref(), row, &mut counts.statuses);
-        count(self.repair.as_ref(), row, &mut counts.repairs);
-        count(self.fault.as_ref(), row, &mut counts.faults);
-        if let Some(latency) = number::<Int64Type>(self.latency, row) {
-            *counts.rest.latencies.entry(latency).or_default() += 1;
+    fn add(&self, row: usize, Counts { texts, rest }: &mut Counts) {
+        for (column, counts) in self.texts.iter().zip(texts) {
+            let Some((column, code)) = column.as_ref().and_then(|column| Some((column, column.code(row)?))) else {
+                continue;
+            };
+            if counts.len() <= code {
+                counts.resize(column.texts.len(), 0);
+            }
+            counts[code] += 1;
         }
-        for (column, total) in [
-            (self.prompt_tokens, &mut counts.rest.prompt_tokens),
-            (self.completion_tokens, &mut counts.rest.completion_tokens),
-        ] {
+        let [latency, prompt, completion, cost] = self.numbers;
+        if let Some(latency) = number::<Int64Type>(latency, row) {
+            *rest.latencies.entry(latency).or_default() += 1;
+        }
+        for (column, total) in [(prompt, &mut rest.prompt_tokens), (completion, &mut rest.completion_tokens)] {
             if let Some(tokens) = number::<Int64Type>(column, row) {
                 total.add(tokens.into());
             }
         }
-        if let Some(cost) = number::<Float64Type>(self.cost, row).filter(|cost| cost.is_finite()) {
+        if let Some(cost) = number::<Float64Type>(cost, row).filter(|cost| cost.is_finite()) {
             #[expect(clippy::cast_possible_truncation, reason = "a cost of a reply is far below 2^127 billionths")]
-            counts.rest.cost_nano_usd.add((cost * NANO).round() as i128);
+            rest.cost_nano_usd.add((cost * NANO).round() as i128);
         }
     }
 }
@@ -384,8 +365,8 @@ struct Coded<'a> {
 }
 
 enum Codes<'a> {
-    Bytes(&'a arrow::array::UInt8Array),
-    Keys(&'a arrow::array::Int32Array),
+    Bytes(&'a UInt8Array),
+    Keys(&'a Int32Array),
 }
 
 impl<'a> Coded<'a> {
@@ -403,15 +384,6 @@ impl<'a> Coded<'a> {
             Codes::Keys(codes) => codes.is_valid(row).then(|| usize::try_from(codes.value(row)).ok())?,
         }
     }
-}
-
-fn count(column: Option<&Coded<'_>>, row: usize, counts: &mut Vec<u64>) {
-    let Some(column) = column else { return };
-    let Some(code) = column.code(row) else { return };
-    if counts.len() <= code {
-        counts.resize(column.texts.len(), 0);
-    }
-    counts[code] += 1;
 }
 
 #[cfg(test)]

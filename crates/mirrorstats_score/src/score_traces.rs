@@ -78,10 +78,11 @@ pub struct Outputs<'a> {
     pub unchecked: &'a [&'a str],
 }
 
-/// The results of one scan, with the tables as an array of known length or as a vector.
+/// The results of one scan.
 #[derive(Clone, Debug)]
-pub struct Scored<T> {
-    pub tables: T,
+pub struct Scored {
+    /// A table per definitions.
+    pub tables: Vec<EpisodeTable>,
     /// The timelines of the first definitions, in key order. `None` if they were not requested, or if the definitions
     /// do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
@@ -96,37 +97,24 @@ pub fn score(
     labels: &[String],
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
-    let Scored { tables: [table], .. } =
-        score_each(traces, [definitions], Outputs { labels, ..Outputs::default() }, threads)?;
-    Ok(table)
+    let scored = score_all(traces, &[definitions], Outputs { labels, ..Outputs::default() }, threads)?;
+    Ok(scored.tables.into_iter().next().expect("a table per definitions"))
 }
 
 /// Scores all episodes of some traces under several definitions, in one scan and one plan: shared steps are computed
 /// once.
-pub fn score_each<const N: usize>(
-    traces: &TraceSet,
-    definitions: [&Definitions; N],
-    outputs: Outputs<'_>,
-    threads: NonZeroUsize,
-) -> Result<Scored<[EpisodeTable; N]>, ScoreError> {
-    let Scored { tables, timelines, quality } = score_all(traces, &definitions, outputs, threads)?;
-    let tables = tables.try_into().expect("a table per definitions");
-    Ok(Scored { tables, timelines, quality })
-}
-
-/// Like [`score_each`], for a number of definitions known at run time.
 pub fn score_all(
     traces: &TraceSet,
     definitions: &[&Definitions],
     outputs: Outputs<'_>,
     threads: NonZeroUsize,
-) -> Result<Scored<Vec<EpisodeTable>>, ScoreError> {
+) -> Result<Scored, ScoreError> {
     let mut plan = PhysicalPlan::of(&definitions.iter().map(|definitions| &definitions.plan).collect::<Vec<_>>());
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
     check_work(traces, &plan)?;
     let mut projection = projection(traces, definitions, &plan, outputs.labels)?;
-    take_as_they_are(&mut projection, outputs.unchecked, definitions.first());
+    leave_unchecked(&mut projection, outputs.unchecked, definitions.first());
     if let Some(quality) = outputs.quality {
         let known = |name: &&String| projection.steps.contains(name) || projection.unchecked.contains(name);
         let new = quality.columns().iter().filter(|name| !known(name)).cloned().collect::<Vec<_>>();
@@ -170,7 +158,7 @@ fn of_first(traces: &TraceSet, source: EngineError) -> ScoreError {
     ScoreError::Engine { file: traces.files().first().map_or("", TraceFile::name).to_owned(), source }
 }
 
-fn take_as_they_are(projection: &mut Projection, columns: &[&str], definitions: Option<&&Definitions>) {
+fn leave_unchecked(projection: &mut Projection, columns: &[&str], definitions: Option<&&Definitions>) {
     let (read, _) = definitions.map(|definitions| PhysicalPlan::of(&[&definitions.plan]).columns()).unwrap_or_default();
     let is_free = |name: &String| columns.contains(&name.as_str()) && !read.contains(name);
     let (free, steps) = std::mem::take(&mut projection.steps).into_iter().partition::<Vec<_>, _>(is_free);

@@ -95,14 +95,7 @@ pub(super) fn in_key_order(mut timelines: Vec<Timeline>) -> Vec<Timeline> {
 }
 
 fn runs(timesteps: &[i64]) -> Vec<RangeInclusive<u32>> {
-    let mut runs: Vec<RangeInclusive<u32>> = Vec::new();
-    for t in timesteps.iter().map(|&t| as_step(t)) {
-        match runs.last_mut() {
-            Some(run) if run.end() + 1 == t => *run = *run.start()..=t,
-            _ => runs.push(t..=t),
-        }
-    }
-    runs
+    timesteps.chunk_by(|a, b| a + 1 == *b).map(|run| as_step(run[0])..=as_step(run[run.len() - 1])).collect()
 }
 
 /// A timestep in the schema's type: 32 bits.

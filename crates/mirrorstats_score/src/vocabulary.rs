@@ -2,7 +2,7 @@
 
 use super::error::ScoreError;
 use mirrorstats_exact::suggest::nearest;
-use mirrorstats_metric::columns::{Column, Columns, Fallback, Level, Type};
+use mirrorstats_metric::columns::{Column, ColumnOrigin, Columns, Fallback, KnownColumn, Level, Type};
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::file::ColumnEntry;
 use mirrorstats_trace::read::open::TraceSet;
@@ -11,54 +11,47 @@ use mirrorstats_trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 
 /// The schema's columns, which definitions may name whether or not the traces have them.
 pub fn schema_columns() -> Columns {
-    let column = |column: &mirrorstats_trace::schema::Column| {
+    let known = |column: &schema::Column| {
         let level = if column.constant { Level::Episode } else { Level::Step };
-        type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
+        let known = KnownColumn {
+            column: Column { ty: type_of(column.stored.kind())?, level },
+            origin: if is_general(column.name) { ColumnOrigin::Schema } else { ColumnOrigin::Mirror },
+            values: column.values.iter().map(ToString::to_string).collect(),
+            // A trace without a required column is an exception that its experiment declares.
+            fallback: column.default.map(|expression| Fallback { expression, is_read: column.required }),
+        };
+        Some((column.name, known))
     };
-    let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
-    let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
-    let of_mirror = COLUMNS.iter().map(|column| column.name).filter(|name| !is_general(name));
-    let mut columns = columns.with_values(lists).with_mirror(of_mirror);
-    // A trace without a required column is an exception that its experiment declares.
-    set_fallbacks(&mut columns, |name| schema::column(name).is_some_and(|known| known.required));
-    columns
+    COLUMNS.iter().filter(|column| column.name != "t").filter_map(known).collect()
 }
 
 /// The columns that definitions may name before any trace is open: like [`schema_columns`], but each row may have a
 /// value.
 pub fn unknown_columns() -> Columns {
     let mut columns = schema_columns();
-    set_fallbacks(&mut columns, |_| true);
+    columns.set_read(|_| true);
     columns
-}
-
-/// Sets the meaning of missing values; `is_read` returns true if some trace has the column.
-fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
-    for column in COLUMNS.iter() {
-        if let Some(expression) = column.default {
-            columns.set_fallback(column.name, Fallback { expression, is_read: is_read(column.name) });
-        }
-    }
 }
 
 /// The columns that definitions may name over these traces: the schema's and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns =
         schema_columns().with_help("`mirrorstats trace schema`, `trace info` and `trace labels` list the columns");
-    set_fallbacks(&mut columns, |name| traces.declares(name));
+    columns.set_read(|name| traces.declares(name));
     for column in COLUMNS.iter().filter(|column| !traces.knows(column)) {
         columns.forget(column.name);
     }
-    for name in traces.column_names().into_iter().filter(|name| *name != "t") {
-        let found = traces.column(name);
-        if found.as_ref().is_some_and(|column| column.is_null) {
-            columns.set_null(name);
-        } else if let Some(ty) = found.and_then(|column| type_of(column.kind)) {
-            columns.set_own(name, Column { ty, level: Level::Step });
-        }
-    }
     for name in traces.label_columns() {
-        columns.add_known(name, Column { ty: Type::Bool, level: Level::Episode });
+        columns.add(name, KnownColumn::new(Column { ty: Type::Bool, level: Level::Episode }, ColumnOrigin::Schema));
+    }
+    for name in traces.column_names().into_iter().filter(|name| *name != "t") {
+        let Some(found) = traces.column(name) else { continue };
+        let (ty, origin) = match type_of(found.kind) {
+            _ if found.is_null => (Type::Text, ColumnOrigin::OnlyNulls),
+            Some(ty) => (ty, ColumnOrigin::Own),
+            None => continue,
+        };
+        columns.add(name, KnownColumn::new(Column { ty, level: Level::Step }, origin));
     }
     columns
 }

@@ -82,7 +82,7 @@ impl FileKind {
         part: impl FnMut(&At<'_>, &Part, &mut Vec<Fault>),
     ) -> Result<Vec<Arc<Source>>, Faults> {
         let mut reading =
-            Reading { kind: self, part, open: Vec::new(), followed: 0, told: Vec::new(), texts: Vec::new() };
+            Reading { kind: self, part, open: Vec::new(), followed: 0, reported: Vec::new(), texts: Vec::new() };
         let mut faults = Vec::new();
         reading.file(file, &mut faults);
         if faults.is_empty() { Ok(reading.texts) } else { Err(Faults(faults).in_order()) }
@@ -94,7 +94,7 @@ struct Reading<'k, F> {
     part: F,
     open: Vec<(String, Option<PathBuf>)>,
     followed: u64,
-    told: Vec<String>,
+    reported: Vec<String>,
     texts: Vec<Arc<Source>>,
 }
 
@@ -128,7 +128,7 @@ impl<F: FnMut(&At<'_>, &Part, &mut Vec<Fault>)> Reading<'_, F> {
         self.followed += 1;
         if let Err(exceeded) = self.kind.most_includes.check(self.followed) {
             if self.kind.most_includes.check(self.followed - 1).is_ok() {
-                self.tell(Fault::new(place.clone(), exceeded.to_string()), faults);
+                self.report(Fault::new(place.clone(), exceeded.to_string()), faults);
             }
             return;
         }
@@ -137,7 +137,7 @@ impl<F: FnMut(&At<'_>, &Part, &mut Vec<Fault>)> Reading<'_, F> {
             Ok(file) if self.leads_back(&file) => {
                 let names = self.open.iter().map(|(open, _)| open.as_str()).chain([file.source.name.as_str()]);
                 let chain = names.collect::<Vec<_>>().join(" -> ");
-                self.tell(Fault::new(place.clone(), format!("the include leads back to itself: {chain}")), faults);
+                self.report(Fault::new(place.clone(), format!("the include leads back to itself: {chain}")), faults);
             }
             Ok(file) => {
                 let mut inner = Vec::new();
@@ -147,7 +147,7 @@ impl<F: FnMut(&At<'_>, &Part, &mut Vec<Fault>)> Reading<'_, F> {
             Err(error) => {
                 let help = format!("a path is relative to this file; {}", self.kind.did_you_mean(name));
                 let message = format!("cannot read the {} `{}`: {error}", self.kind.name, path.display());
-                self.tell(Fault::new(place.clone(), message).help(help), faults);
+                self.report(Fault::new(place.clone(), message).help(help), faults);
             }
         }
     }
@@ -161,20 +161,20 @@ impl<F: FnMut(&At<'_>, &Part, &mut Vec<Fault>)> Reading<'_, F> {
 
     fn concealed(&mut self, first: Fault, place: &Place) -> Fault {
         let FileKind { name: kind, check, .. } = self.kind;
-        let message = if self.told.contains(&first.message) {
+        let message = if self.reported.contains(&first.message) {
             first.message
         } else {
             let (line, column) = first.line_and_column();
             let name = &first.place.source.name;
             format!("the included file `{name}` is no {kind}: it cannot be read from line {line}, column {column} on")
         };
-        self.told.push(message.clone());
+        self.reported.push(message.clone());
         let help = format!("expected TOML with the keys of a {kind}; `{check}` shows the line");
         Fault::new(place.clone(), message).help(help)
     }
 
-    fn tell(&mut self, fault: Fault, faults: &mut Vec<Fault>) {
-        self.told.push(fault.message.clone());
+    fn report(&mut self, fault: Fault, faults: &mut Vec<Fault>) {
+        self.reported.push(fault.message.clone());
         faults.push(fault);
     }
 }

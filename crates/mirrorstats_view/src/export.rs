@@ -17,7 +17,7 @@ use super::answers::{changes, episode, list, map, overview};
 use super::found::Found;
 use super::logs::Opened;
 use super::snapshot::Together;
-use super::{Options, Snapshot, View, ViewError, film, page};
+use super::{Options, Snapshot, View, ViewError, page};
 use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
 use mirrorstats_exact::hash;
 use mirrorstats_exact::replace::{
@@ -111,7 +111,7 @@ fn write_found(
     stage: TemporaryFolder,
     progress: Progress<'_>,
 ) -> Result<usize, ViewError> {
-    let snapshot = Snapshot::of_found(options, found, 0)?;
+    let snapshot = Snapshot::of_found(options, &found, 0)?;
     let mut files = Files {
         stage,
         folder: folder.to_owned(),
@@ -176,8 +176,8 @@ fn add_episodes(
             running.into_iter().map(|one| one.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
         });
         for ((at, _), made) in named.iter().zip(made) {
-            let (told, texts) = made?;
-            files.part(&format!("episode-{at}"), &told)?;
+            let (entry, texts) = made?;
+            files.part(&format!("episode-{at}"), &entry)?;
             said.insert(*at, texts);
         }
     }
@@ -191,13 +191,13 @@ type Made = Result<(Value, Value), ViewError>;
 pub fn episode_page(view: &View, id: &str) -> Result<String, ViewError> {
     let snapshot = view.newest();
     let opened = snapshot.episode(id)?;
-    let (mut told, _) = part_of(&snapshot, &opened, episode::scores(&snapshot, &opened)?)?;
-    told["siblings"] = json!([]);
+    let (mut entry, _) = part_of(&snapshot, &opened, episode::scores(&snapshot, &opened)?)?;
+    entry["siblings"] = json!([]);
     let everything = list::everything(&snapshot)?;
     let mut list = everything.clone();
     let rows = everything["rows"].as_array().into_iter().flatten().filter(|row| row["id"] == id);
     list["rows"] = rows.cloned().collect::<Vec<_>>().into();
-    let parts = json!({"study": overview::study(&snapshot), "list": list, "episode-0": told});
+    let parts = json!({"study": overview::study(&snapshot), "list": list, "episode-0": entry});
     let parts = parts.to_string().replace('<', "\\u003c");
     let script = format!("window.mirrorstatsParts = {parts};\n{}", page::classic());
     let (script_hash, style) = (hash::integrity_of_bytes(script.as_bytes()), page::style());
@@ -214,10 +214,10 @@ fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Resu
     let id = &opened.episode.episode_id;
     // The server's page reports an unreadable log; the export fails, since a copy needs its frames.
     let first = snapshot.logs.moment(opened, 1)?;
-    let mut told = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
-    told["siblings"] = list::siblings(snapshot, id).into();
-    let said = said(&told);
-    if told["log"] == true {
+    let mut entry = episode::described(snapshot, opened, usize::MAX, first.as_ref(), scores);
+    entry["siblings"] = list::siblings(snapshot, id).into();
+    let said = said(&entry);
+    if entry["log"] == true {
         let (mut images, mut places, mut map) = (Vec::new(), BTreeMap::new(), map::Map::default());
         let length = opened.episode.steps.len();
         let (mut hashes, mut of) = (vec![Value::Null; length], vec![Value::Null; length]);
@@ -231,17 +231,17 @@ fn part_of(snapshot: &Snapshot, opened: &Opened, scores: (Value, Value)) -> Resu
             });
             (hashes[t - 1], of[t - 1]) = (hash.into(), at.into());
         })?;
-        told["map"] = map.told(length);
-        told["frame_hashes"] = hashes.into();
-        told["images"] = json!({"of": of, "png": images});
+        entry["map"] = map.into_json(length);
+        entry["frame_hashes"] = hashes.into();
+        entry["images"] = json!({"of": of, "png": images});
     }
-    Ok((told, said))
+    Ok((entry, said))
 }
 
 /// The columns that the server searches too.
-fn said(told: &Value) -> Value {
-    let steps = told["steps"].as_object().into_iter().flatten();
-    let is_mirror = told["own"] == false;
+fn said(entry: &Value) -> Value {
+    let steps = entry["steps"].as_object().into_iter().flatten();
+    let is_mirror = entry["own"] == false;
     let texts = steps.filter(|(name, _)| !is_mirror || mirrorstats_trace::read::search::SAID.contains(&name.as_str()));
     let texts = texts.filter(|(_, column)| column["is_number"] == false);
     let texts = texts.filter(|(_, column)| column["values"].as_array().into_iter().flatten().any(Value::is_string));
@@ -251,9 +251,15 @@ fn said(told: &Value) -> Value {
 /// The same picture in fewer bytes: logs are written fast, a copy once. Rendered rooms have few colours and long runs,
 /// which a palette keeps and PNG filters break. Measured on frames of E1 to E5: 55 % of the bytes.
 fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
-    let (width, height, pixels) = film::pixels(frame).ok()?;
+    let mut reader = png::Decoder::new(io::Cursor::new(frame)).read_info().ok()?;
+    let mut pixels = vec![0; reader.output_buffer_size()?];
+    let info = reader.next_frame(&mut pixels).ok()?;
+    if info.color_type != png::ColorType::Rgb || info.bit_depth != png::BitDepth::Eight {
+        return None;
+    }
+    pixels.truncate(info.buffer_size());
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    let mut encoder = png::Encoder::new(&mut bytes, info.width, info.height);
     encoder.set_compression(png::Compression::Balanced);
     encoder.set_filter(png::Filter::NoFilter);
     if let Some((palette, places)) = indexed(&pixels) {
@@ -304,16 +310,8 @@ fn check_folder(folder: &Path) -> Result<(), ViewError> {
 fn old_files(root: &Path) -> Vec<PathBuf> {
     let mut old: BTreeSet<PathBuf> =
         ["index.html", "robots.txt", "NOTICE.txt", "assets/view.css", MARK].map(PathBuf::from).into();
-    let has_ending = |path: &PathBuf, ending: &str| path.extension().is_some_and(|found| found == ending);
-    old.extend(entries(root, Path::new("data")).filter(|path| has_ending(path, "js")));
-    for episode in entries(root, Path::new("frames")) {
-        old.extend(entries(root, &episode).filter(|path| has_ending(path, "png")));
-    }
+    let data = fs::read_dir(root.join("data")).into_iter().flatten().flatten();
+    let parts = data.map(|entry| Path::new("data").join(entry.file_name()));
+    old.extend(parts.filter(|path| path.extension().is_some_and(|ending| ending == "js")));
     old.into_iter().collect()
-}
-
-/// The entries of a folder, as paths relative to `root`.
-fn entries(root: &Path, inside: &Path) -> impl Iterator<Item = PathBuf> {
-    let found = fs::read_dir(root.join(inside)).into_iter().flatten().flatten();
-    found.map(move |entry| inside.join(entry.file_name()))
 }

@@ -32,7 +32,6 @@
 mod answers;
 mod error;
 pub mod export;
-pub mod film;
 mod filter;
 mod found;
 mod logs;

@@ -70,22 +70,34 @@ pub(super) struct Together {
 
 impl Snapshot {
     pub fn open(options: &Options, generation: u64) -> Result<Self, ViewError> {
-        Self::of_found(options, Found::of(&options.runs)?, generation)
+        Self::of_found(options, &Found::of(&options.runs)?, generation)
     }
 
-    pub fn of_found(options: &Options, found: Found, generation: u64) -> Result<Self, ViewError> {
+    pub fn of_found(options: &Options, found: &Found, generation: u64) -> Result<Self, ViewError> {
         mirrorstats_report::style::Style::load(&options.style).map_err(StudyError::from)?;
-        let (stamps, label_stamps) = (found.stamps(), found.label_stamps());
-        let scored = Self::scored(options, &found)?.map(Arc::new);
-        let (running, unreadable) = running(&found, scored.as_deref());
-        if scored.is_none() && running.is_empty() {
+        let stamps = (found.stamps(), found.label_stamps());
+        let scored = Self::scored(options, found)?.map(Arc::new);
+        let snapshot = Self::new(options, found, scored, generation, stamps);
+        if snapshot.scored.is_none() && snapshot.running.is_empty() {
             let runs = options.runs.iter().map(|run| visible(&run.to_string_lossy())).collect::<Vec<_>>().join(", ");
             return Err(ViewError::Absent(format!(
                 "{runs}: expected traces, or a recording that has begun, found no episode\n  help: `mirrorstats trace recover` makes \
                  a trace of a log"
             )));
         }
-        Ok(Self {
+        Ok(snapshot)
+    }
+
+    /// `stamps` are those of the traces and logs, and those of the labels.
+    fn new(
+        options: &Options,
+        found: &Found,
+        scored: Option<Arc<Scored>>,
+        generation: u64,
+        (stamps, label_stamps): (Vec<Stamp>, Vec<Stamp>),
+    ) -> Self {
+        let (running, unreadable) = running(found, scored.as_deref());
+        Self {
             generation,
             options: options.clone(),
             scored,
@@ -93,12 +105,12 @@ impl Snapshot {
             unreadable,
             stamps,
             label_stamps,
-            logs: Logs::new(found.logs),
+            logs: Logs::new(found.logs.clone()),
             kept: Recent::default(),
             said: Recent::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::default(),
-        })
+        }
     }
 
     /// A copy with the current labels. Scores that depend on labels are computed again.
@@ -114,20 +126,11 @@ impl Snapshot {
 
     /// A copy with the current state of the episodes under way.
     pub fn grown(&self, found: &Found, scored: Option<Arc<Scored>>) -> Self {
-        let (running, unreadable) = running(found, scored.as_deref());
+        let stamps = (self.stamps.clone(), self.label_stamps.clone());
         Self {
-            generation: self.generation + 1,
-            options: self.options.clone(),
-            scored,
-            running,
-            unreadable,
-            stamps: self.stamps.clone(),
-            label_stamps: self.label_stamps.clone(),
-            logs: Logs::new(self.logs.paths.clone()),
-            kept: Recent::default(),
-            said: Recent::default(),
             #[cfg(feature = "sim")]
             rendered: Arc::clone(&self.rendered),
+            ..Self::new(&self.options, found, scored, self.generation + 1, stamps)
         }
     }
 

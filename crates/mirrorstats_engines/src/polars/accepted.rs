@@ -3,8 +3,6 @@
 
 use polars::prelude::DataType;
 
-use mirrorstats_trace::schema::Stored;
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Null,
@@ -21,32 +19,19 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub(super) fn stored(stored: Stored) -> (Self, u32) {
-        match stored {
-            Stored::Bool => (Self::Bool, 0),
-            Stored::Int8 => (Self::Int, 7),
-            Stored::Int32 => (Self::Int, 31),
-            Stored::Int64 => (Self::Int, 63),
-            Stored::Float32 => (Self::Real, 0),
-            Stored::Float64 => (Self::Float, 0),
-            Stored::String => (Self::Text, 0),
-        }
-    }
-
     /// The kind of a column, and the bits of its largest integer.
     pub(super) fn of(ty: &DataType) -> (Self, u32) {
-        let stored = match ty {
-            DataType::Boolean => Stored::Bool,
-            DataType::Int8 => Stored::Int8,
-            DataType::Int32 => Stored::Int32,
-            DataType::Int64 => Stored::Int64,
-            DataType::Float32 => Stored::Float32,
-            DataType::Float64 => Stored::Float64,
-            DataType::String => Stored::String,
-            DataType::Null => return (Self::Null, 0),
-            _ => return (Self::Other, 0),
-        };
-        Self::stored(stored)
+        match ty {
+            DataType::Null => (Self::Null, 0),
+            DataType::Boolean => (Self::Bool, 0),
+            DataType::Int8 => (Self::Int, 7),
+            DataType::Int32 => (Self::Int, 31),
+            DataType::Int64 => (Self::Int, 63),
+            DataType::Float32 => (Self::Real, 0),
+            DataType::Float64 => (Self::Float, 0),
+            DataType::String => (Self::Text, 0),
+            _ => (Self::Other, 0),
+        }
     }
 
     pub(super) fn wide(self) -> DataType {

@@ -5,7 +5,6 @@
 
 pub mod accepted;
 pub mod answer;
-pub mod frame;
 mod functions;
 mod names;
 mod plan;

@@ -14,7 +14,7 @@ use sqlparser::ast::{
 use sqlparser::tokenizer::Span;
 
 use super::accepted::Kind;
-use super::refused::{QueryError, unsupported, wrong};
+use super::refused::{QueryError, QueryResult, unsupported, wrong};
 use super::relation::{Column, Found, Relation, find};
 use super::run::{self, PolarsError};
 use super::scope::Scope;
@@ -23,8 +23,6 @@ use super::value::{Value, common};
 use super::windows::{Order, integer};
 use mirrorstats_metric::syntax::grammar::{bytes_of, shortened};
 use mirrorstats_toml_spec::{Fault, Faults, Place, Source};
-
-type Answer<T = Relation> = Result<T, QueryError>;
 
 pub(super) struct Planner<'s> {
     pub(super) source: &'s Arc<Source>,
@@ -43,11 +41,11 @@ impl<'s> Planner<'s> {
         format!("column {}", self.names)
     }
 
-    pub(super) fn unsupported<T>(&self, span: Span, what: impl std::fmt::Display) -> Answer<T> {
+    pub(super) fn unsupported<T>(&self, span: Span, what: impl std::fmt::Display) -> QueryResult<T> {
         Err(unsupported(self.source, span, format!("`{}`", shortened(&what.to_string()))))
     }
 
-    fn wrong<T>(&self, span: Span, message: impl Into<String>, help: &str) -> Answer<T> {
+    fn wrong<T>(&self, span: Span, message: impl Into<String>, help: &str) -> QueryResult<T> {
         Err(wrong(self.source, span, message, Some(help.to_owned())))
     }
 
@@ -68,7 +66,7 @@ impl<'s> Planner<'s> {
     }
 
     /// The value of a subquery's only row; null without a row.
-    pub(super) fn scalar(&mut self, query: &Query) -> Answer<Value> {
+    pub(super) fn scalar(&mut self, query: &Query) -> QueryResult<Value> {
         let (column, found) = self.column(query)?;
         if found.len() > 1 {
             let message = format!("it is in the place of a value and has {} rows", found.len());
@@ -83,7 +81,7 @@ impl<'s> Planner<'s> {
     }
 
     /// The rows of a subquery's only column.
-    pub(super) fn column(&mut self, query: &Query) -> Answer<(Value, Series)> {
+    pub(super) fn column(&mut self, query: &Query) -> QueryResult<(Value, Series)> {
         let relation = self.query(query)?;
         let [column] = relation.columns.as_slice() else {
             let message = format!("it is in the place of a value and has {} columns", relation.columns.len());
@@ -94,11 +92,11 @@ impl<'s> Planner<'s> {
         Ok((column.value(), series))
     }
 
-    pub(super) fn exists(&mut self, query: &Query) -> Answer<bool> {
+    pub(super) fn exists(&mut self, query: &Query) -> QueryResult<bool> {
         Ok(run::collect(self.query(query)?.frame.limit(1))?.height() > 0)
     }
 
-    pub(super) fn query(&mut self, query: &Query) -> Answer {
+    pub(super) fn query(&mut self, query: &Query) -> QueryResult<Relation> {
         let bare = Query { with: None, order_by: None, limit_clause: None, ..query.clone() };
         if bare.to_string() != query.body.to_string() {
             return self.unsupported(query.span(), bare);
@@ -117,7 +115,7 @@ impl<'s> Planner<'s> {
         Ok(relation)
     }
 
-    fn body(&mut self, query: &Query) -> Answer {
+    fn body(&mut self, query: &Query) -> QueryResult<Relation> {
         let orders = match query.order_by.as_ref().map(|order| (&order.kind, &order.interpolate)) {
             None => &[][..],
             Some((OrderByKind::Expressions(keys), None)) => keys,
@@ -147,7 +145,7 @@ impl<'s> Planner<'s> {
         self.limited(relation, query)
     }
 
-    fn limited(&self, relation: Relation, query: &Query) -> Answer {
+    fn limited(&self, relation: Relation, query: &Query) -> QueryResult<Relation> {
         let (limit, offset) = match &query.limit_clause {
             None => return Ok(relation),
             Some(LimitClause::LimitOffset { limit, offset, limit_by }) if limit_by.is_empty() => (limit, offset),
@@ -162,7 +160,7 @@ impl<'s> Planner<'s> {
         Ok(Relation { frame: relation.frame.slice(offset.into(), limit), ..relation })
     }
 
-    fn set(&mut self, body: &SetExpr) -> Answer {
+    fn set(&mut self, body: &SetExpr) -> QueryResult<Relation> {
         match body {
             SetExpr::Select(select) => self.select(select, &[]),
             SetExpr::Query(query) => self.query(query),
@@ -184,7 +182,7 @@ impl<'s> Planner<'s> {
         }
     }
 
-    fn union(&mut self, body: &SetExpr, left: &Relation, right: &Relation) -> Answer {
+    fn union(&mut self, body: &SetExpr, left: &Relation, right: &Relation) -> QueryResult<Relation> {
         let (found, expected) = (right.columns.len(), left.columns.len());
         if found != expected {
             let message = format!("UNION of {expected} and {found} columns");
@@ -209,7 +207,7 @@ impl<'s> Planner<'s> {
         Ok(Relation { frame: concat(frames, UnionArgs::default()).map_err(PolarsError::from)?, columns })
     }
 
-    pub(super) fn from(&mut self, tables: &[TableWithJoins]) -> Answer {
+    pub(super) fn from(&mut self, tables: &[TableWithJoins]) -> QueryResult<Relation> {
         let Some((table, others)) = tables.split_first() else {
             // One row without a column.
             let frame = df!("" => [0_i64]).map_err(PolarsError::from)?.lazy();
@@ -222,14 +220,14 @@ impl<'s> Planner<'s> {
         table.joins.iter().try_fold(first, |left, join| self.join(left, join))
     }
 
-    fn alias(&self, alias: &TableAlias) -> Answer<String> {
+    fn alias(&self, alias: &TableAlias) -> QueryResult<String> {
         if alias.columns.is_empty() && alias.at.is_none() {
             return Ok(alias.name.value.clone());
         }
         self.unsupported(alias.name.span, alias)
     }
 
-    fn factor(&mut self, factor: &TableFactor) -> Answer {
+    fn factor(&mut self, factor: &TableFactor) -> QueryResult<Relation> {
         let (relation, name, alias) = match factor {
             TableFactor::Table { name, alias, .. } => {
                 let written = alias.as_ref().map_or_else(|| name.to_string(), |alias| format!("{name} {alias}"));
@@ -254,7 +252,7 @@ impl<'s> Planner<'s> {
         with.map(|(_, relation)| relation.clone()).or_else(|| self.tables.get(&Table::named(word)?).cloned())
     }
 
-    fn join(&mut self, left: Relation, join: &Join) -> Answer {
+    fn join(&mut self, left: Relation, join: &Join) -> QueryResult<Relation> {
         let right = self.factor(&join.relation)?;
         let clash = right.columns.first().filter(|one| left.columns.iter().any(|other| other.table == one.table));
         if let Some(table) = clash.map(|column| column.table.clone()).filter(|_| !join.global) {
@@ -280,7 +278,13 @@ impl<'s> Planner<'s> {
         }
     }
 
-    fn joined_using(&mut self, left: Relation, mut right: Relation, names: &[Ident], how: JoinType) -> Answer {
+    fn joined_using(
+        &mut self,
+        left: Relation,
+        mut right: Relation,
+        names: &[Ident],
+        how: JoinType,
+    ) -> QueryResult<Relation> {
         let mut pairs = Vec::new();
         for name in names {
             let of = |planner: &mut Self, columns: &[Column]| {
@@ -295,7 +299,7 @@ impl<'s> Planner<'s> {
     }
 
     /// A join on equalities; an inner join may have further conditions.
-    fn joined_on(&mut self, left: Relation, right: Relation, condition: &Ast, how: JoinType) -> Answer {
+    fn joined_on(&mut self, left: Relation, right: Relation, condition: &Ast, how: JoinType) -> QueryResult<Relation> {
         let all = [left.columns.clone(), right.columns.clone()].concat();
         let (mut pairs, mut others) = (Vec::new(), Vec::new());
         for part in conjuncts(condition) {
@@ -321,7 +325,7 @@ impl<'s> Planner<'s> {
         straight.or_else(|| of(left, b).zip(of(right, a))).map(|(left, right)| [left, right])
     }
 
-    fn equal(&mut self, left: Relation, right: Relation, pairs: &[[Value; 2]], how: JoinType) -> Answer {
+    fn equal(&mut self, left: Relation, right: Relation, pairs: &[[Value; 2]], how: JoinType) -> QueryResult<Relation> {
         let (mut sides, mut names) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
         for pair in pairs {
             let kind = common(pair).filter(|_| pair.iter().all(Value::is_exact)).filter(|kind| *kind != Kind::Null);

@@ -19,6 +19,8 @@ pub enum QueryError {
     Polars(#[from] PolarsError),
 }
 
+pub(super) type QueryResult<T> = Result<T, QueryError>;
+
 pub(super) fn fault(source: &Arc<Source>, span: Span, message: impl Into<String>) -> Fault {
     Fault::new(Place { source: Arc::clone(source), span: bytes_of(&source.text, span) }, message)
 }

@@ -12,7 +12,7 @@ use sqlparser::tokenizer::Span;
 use super::accepted::{CASTS, Kind};
 use super::functions::scalar;
 use super::plan::Planner;
-use super::refused::{QueryError, unsupported, wrong};
+use super::refused::{QueryError, QueryResult, unsupported, wrong};
 use super::relation::{Column, Found, find};
 use super::value::{Value, arithmetic, balanced, common, compare, one_of};
 use super::windows::Window;
@@ -47,8 +47,6 @@ pub(super) struct Scope<'p, 's> {
     pub(super) depth: usize,
 }
 
-type Answer<T = Value> = Result<T, QueryError>;
-
 impl<'p, 's> Scope<'p, 's> {
     pub(super) fn new(planner: &'p mut Planner<'s>, columns: Vec<Column>) -> Self {
         let (aliases, prepared, aggregates, windows) = Default::default();
@@ -59,29 +57,33 @@ impl<'p, 's> Scope<'p, 's> {
         self.planner.source
     }
 
-    pub(super) fn unsupported<T>(&self, ast: &Ast) -> Answer<T> {
+    pub(super) fn unsupported<T>(&self, ast: &Ast) -> QueryResult<T> {
         Err(unsupported(self.source(), ast.span(), format!("`{}`", shortened(&ast.to_string()))))
     }
 
-    pub(super) fn wrong<T>(&self, span: Span, message: impl Into<String>, help: Option<String>) -> Answer<T> {
+    pub(super) fn wrong<T>(&self, span: Span, message: impl Into<String>, help: Option<String>) -> QueryResult<T> {
         Err(wrong(self.source(), span, message, help))
     }
 
     /// Refuses kinds that do not fit.
-    pub(super) fn unfit<T>(&self, ast: &Ast, values: &[Value]) -> Answer<T> {
+    pub(super) fn unfit<T>(&self, ast: &Ast, values: &[Value]) -> QueryResult<T> {
         let kinds = values.iter().map(|value| value.kind.sql()).collect::<Vec<_>>().join(", ");
         Err(unsupported(self.source(), ast.span(), format!("`{}` of {kinds}", shortened(&ast.to_string()))))
     }
 
     /// Runs work in which aggregates are refused.
-    pub(super) fn rows<T>(&mut self, place: &'static str, work: impl FnOnce(&mut Self) -> Answer<T>) -> Answer<T> {
+    pub(super) fn rows<T>(
+        &mut self,
+        place: &'static str,
+        work: impl FnOnce(&mut Self) -> QueryResult<T>,
+    ) -> QueryResult<T> {
         let before = self.rows_of.replace(place);
         let result = work(self);
         self.rows_of = before;
         result
     }
 
-    pub(super) fn value(&mut self, ast: &Ast) -> Answer {
+    pub(super) fn value(&mut self, ast: &Ast) -> QueryResult<Value> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return self.wrong(ast.span(), "the query is nested too deeply", Some("name parts of it with WITH".into()));
@@ -105,7 +107,7 @@ impl<'p, 's> Scope<'p, 's> {
         keys.iter().find(same).map(|key| key.grouped.clone())
     }
 
-    fn expression(&mut self, ast: &Ast) -> Answer {
+    fn expression(&mut self, ast: &Ast) -> QueryResult<Value> {
         match ast {
             Ast::Nested(inner) => self.value(inner),
             Ast::Identifier(name) => self.identifier(ast, name),
@@ -166,7 +168,11 @@ impl<'p, 's> Scope<'p, 's> {
     }
 
     /// A subquery in an expression, which runs before the query around it.
-    fn alone<T>(&mut self, query: &Query, run: impl FnOnce(&mut Planner<'s>, &Query) -> Answer<T>) -> Answer<T> {
+    fn alone<T>(
+        &mut self,
+        query: &Query,
+        run: impl FnOnce(&mut Planner<'s>, &Query) -> QueryResult<T>,
+    ) -> QueryResult<T> {
         let remedy = "ask with a JOIN or a table of WITH";
         run(self.planner, query).map_err(|error| match error {
             QueryError::Faults(mut faults) => {
@@ -179,7 +185,7 @@ impl<'p, 's> Scope<'p, 's> {
         })
     }
 
-    fn identifier(&mut self, ast: &Ast, name: &Ident) -> Answer {
+    fn identifier(&mut self, ast: &Ast, name: &Ident) -> QueryResult<Value> {
         match find(&self.columns, None, &name.value) {
             Found::One(column) => {
                 let value = column.value();
@@ -196,14 +202,14 @@ impl<'p, 's> Scope<'p, 's> {
         }
     }
 
-    fn ambiguous<T>(&self, name: &Ident) -> Answer<T> {
+    fn ambiguous<T>(&self, name: &Ident) -> QueryResult<T> {
         let tables = self.columns.iter().filter(|column| column.name.eq_ignore_ascii_case(&name.value));
         let one = |column: &Column| format!("{}.{}", column.table, column.name);
         let help = format!("write one of {}", tables.map(one).collect::<Vec<_>>().join(", "));
         self.wrong(name.span, format!("several tables have a column `{}`", name.value), Some(help))
     }
 
-    fn compound(&self, ast: &Ast) -> Answer {
+    fn compound(&self, ast: &Ast) -> QueryResult<Value> {
         let Ast::CompoundIdentifier(parts) = ast else { return self.unsupported(ast) };
         let [table, name] = parts.as_slice() else { return self.unsupported(ast) };
         match find(&self.columns, Some(&table.value), &name.value) {
@@ -216,7 +222,7 @@ impl<'p, 's> Scope<'p, 's> {
         }
     }
 
-    fn unknown<T>(&self, name: &Ident) -> Answer<T> {
+    fn unknown<T>(&self, name: &Ident) -> QueryResult<T> {
         let columns: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
         let message = format!("unknown column `{}`", name.value);
         if let Some((span, quoted)) = self.planner.unquoted(name.span, &columns) {
@@ -228,7 +234,7 @@ impl<'p, 's> Scope<'p, 's> {
     }
 
     /// Refuses a column whose type queries do not read.
-    pub(super) fn check_type(&self, span: Span, name: &str, kind: Kind) -> Answer<()> {
+    pub(super) fn check_type(&self, span: Span, name: &str, kind: Kind) -> QueryResult<()> {
         if kind != Kind::Other {
             return Ok(());
         }
@@ -237,7 +243,7 @@ impl<'p, 's> Scope<'p, 's> {
     }
 
     /// Refuses the column of a row where groups are meant.
-    fn ungrouped(&self, name: &Ident, value: Value) -> Answer {
+    fn ungrouped(&self, name: &Ident, value: Value) -> QueryResult<Value> {
         self.check_type(name.span, &name.value, value.kind)?;
         match &self.keys {
             Some(keys) if self.rows_of.is_none() => {
@@ -250,7 +256,7 @@ impl<'p, 's> Scope<'p, 's> {
         }
     }
 
-    fn literal(&self, ast: &Ast, literal: &ValueWithSpan) -> Answer {
+    fn literal(&self, ast: &Ast, literal: &ValueWithSpan) -> QueryResult<Value> {
         match &literal.value {
             Literal::Null => Ok(Value::null()),
             Literal::Boolean(value) => Ok(Value::bool(lit(*value))),
@@ -260,7 +266,7 @@ impl<'p, 's> Scope<'p, 's> {
         }
     }
 
-    fn number(&self, ast: &Ast, text: &str) -> Answer {
+    fn number(&self, ast: &Ast, text: &str) -> QueryResult<Value> {
         if let Ok(number) = text.parse::<i64>() {
             return Ok(Value::int(lit(number), 64 - number.leading_zeros()));
         }
@@ -276,7 +282,7 @@ impl<'p, 's> Scope<'p, 's> {
     }
 
     /// A chain of one operator nests once per operand.
-    fn chain(&mut self, left: &Ast, op: &BinaryOperator, right: &Ast) -> Answer {
+    fn chain(&mut self, left: &Ast, op: &BinaryOperator, right: &Ast) -> QueryResult<Value> {
         let (mut parts, mut rest) = (vec![self.truth(right)?], left);
         while let Ast::BinaryOp { left, op: other, right } = rest {
             if other != op {
@@ -291,12 +297,12 @@ impl<'p, 's> Scope<'p, 's> {
         balanced(parts, join).map_or_else(|| self.unsupported(left), |expr| Ok(Value::bool(expr)))
     }
 
-    pub(super) fn truth(&mut self, ast: &Ast) -> Answer<Expr> {
+    pub(super) fn truth(&mut self, ast: &Ast) -> QueryResult<Expr> {
         let value = self.value(ast)?;
         if matches!(value.kind, Kind::Bool | Kind::Null) { Ok(value.to(Kind::Bool)) } else { self.unfit(ast, &[value]) }
     }
 
-    fn binary(&mut self, ast: &Ast, left: &Ast, op: &BinaryOperator, right: &Ast) -> Answer {
+    fn binary(&mut self, ast: &Ast, left: &Ast, op: &BinaryOperator, right: &Ast) -> QueryResult<Value> {
         use BinaryOperator::{Divide, Eq, Gt, GtEq, Lt, LtEq, Minus, Modulo, Multiply, NotEq, Plus, StringConcat};
         let [left, right] = [self.value(left)?, self.value(right)?];
         let value = match op {
@@ -310,7 +316,7 @@ impl<'p, 's> Scope<'p, 's> {
         value.map_or_else(|| self.unfit(ast, &[left, right]), Ok)
     }
 
-    fn unary(&mut self, ast: &Ast, op: UnaryOperator, inner: &Ast) -> Answer {
+    fn unary(&mut self, ast: &Ast, op: UnaryOperator, inner: &Ast) -> QueryResult<Value> {
         if op == UnaryOperator::Not {
             return Ok(Value::bool(self.truth(inner)?.not()));
         }
@@ -328,13 +334,13 @@ impl<'p, 's> Scope<'p, 's> {
         }
     }
 
-    fn is(&mut self, inner: &Ast, wanted: bool, negated: bool) -> Answer {
+    fn is(&mut self, inner: &Ast, wanted: bool, negated: bool) -> QueryResult<Value> {
         let truth = self.truth(inner)?;
         let met = if wanted { truth } else { truth.not() }.fill_null(lit(false));
         Ok(Value::bool(if negated { met.not() } else { met }))
     }
 
-    fn distinct(&mut self, ast: &Ast, left: &Ast, right: &Ast, wanted: bool) -> Answer {
+    fn distinct(&mut self, ast: &Ast, left: &Ast, right: &Ast, wanted: bool) -> QueryResult<Value> {
         let values = [self.value(left)?, self.value(right)?];
         let kind = common(&values).filter(|_| compare(&values[0], &BinaryOperator::Eq, &values[1]).is_some());
         let Some(kind) = kind else { return self.unfit(ast, &values) };
@@ -342,19 +348,19 @@ impl<'p, 's> Scope<'p, 's> {
         Ok(Value::bool(if wanted { same.not() } else { same }))
     }
 
-    fn compared(&self, ast: &Ast, left: &Value, op: &BinaryOperator, right: &Value) -> Answer<Expr> {
+    fn compared(&self, ast: &Ast, left: &Value, op: &BinaryOperator, right: &Value) -> QueryResult<Expr> {
         let result = compare(left, op, right).map(|value| value.expr);
         result.map_or_else(|| self.unfit(ast, &[left.clone(), right.clone()]), Ok)
     }
 
-    fn between(&mut self, ast: &Ast, expr: &Ast, negated: bool, ends: [&Ast; 2]) -> Answer {
+    fn between(&mut self, ast: &Ast, expr: &Ast, negated: bool, ends: [&Ast; 2]) -> QueryResult<Value> {
         let (value, low, high) = (self.value(expr)?, self.value(ends[0])?, self.value(ends[1])?);
         let from = self.compared(ast, &value, &BinaryOperator::GtEq, &low)?;
         let inside = from.and(self.compared(ast, &value, &BinaryOperator::LtEq, &high)?);
         Ok(Value::bool(if negated { inside.not() } else { inside }))
     }
 
-    fn in_list(&mut self, ast: &Ast, expr: &Ast, list: &[Ast], negated: bool) -> Answer {
+    fn in_list(&mut self, ast: &Ast, expr: &Ast, list: &[Ast], negated: bool) -> QueryResult<Value> {
         let value = self.value(expr)?;
         let mut equal = Vec::new();
         for item in list {
@@ -365,7 +371,7 @@ impl<'p, 's> Scope<'p, 's> {
         Ok(Value::bool(if negated { any.not() } else { any }))
     }
 
-    fn in_subquery(&mut self, ast: &Ast, expr: &Ast, query: &Query, negated: bool) -> Answer {
+    fn in_subquery(&mut self, ast: &Ast, expr: &Ast, query: &Query, negated: bool) -> QueryResult<Value> {
         let value = self.value(expr)?;
         let (items, found) = self.alone(query, Planner::column)?;
         let kind = common([&value, &items]).filter(|_| compare(&value, &BinaryOperator::Eq, &items).is_some());
@@ -381,7 +387,7 @@ impl<'p, 's> Scope<'p, 's> {
         Ok(Value::bool(if negated { inside.not() } else { inside }))
     }
 
-    fn like(&mut self, ast: &Ast, expr: &Ast, pattern: &Ast, negated: bool) -> Answer {
+    fn like(&mut self, ast: &Ast, expr: &Ast, pattern: &Ast, negated: bool) -> QueryResult<Value> {
         let value = self.value(expr)?;
         let Ast::Value(ValueWithSpan { value: Literal::SingleQuotedString(pattern), .. }) = pattern else {
             return self.unsupported(ast);
@@ -402,7 +408,13 @@ impl<'p, 's> Scope<'p, 's> {
         Ok(Value::bool(if negated { met.not() } else { met }))
     }
 
-    fn case(&mut self, ast: &Ast, operand: Option<&Ast>, whens: &[CaseWhen], otherwise: Option<&Ast>) -> Answer {
+    fn case(
+        &mut self,
+        ast: &Ast,
+        operand: Option<&Ast>,
+        whens: &[CaseWhen],
+        otherwise: Option<&Ast>,
+    ) -> QueryResult<Value> {
         let operand = operand.map(|operand| self.value(operand)).transpose()?;
         let (mut conditions, mut results) = (Vec::new(), Vec::new());
         for one in whens {
@@ -426,7 +438,7 @@ impl<'p, 's> Scope<'p, 's> {
         Ok(one_of(expr, kind, &results))
     }
 
-    fn cast(&mut self, ast: &Ast, inner: &Ast, ty: &DataType) -> Answer {
+    fn cast(&mut self, ast: &Ast, inner: &Ast, ty: &DataType) -> QueryResult<Value> {
         let value = self.value(inner)?;
         let target = match ty {
             DataType::Boolean | DataType::Bool => "BOOLEAN",
@@ -451,7 +463,7 @@ impl<'p, 's> Scope<'p, 's> {
     }
 
     /// A scalar function.
-    pub(super) fn call(&mut self, ast: &Ast, name: &str, args: &[&Ast]) -> Answer {
+    pub(super) fn call(&mut self, ast: &Ast, name: &str, args: &[&Ast]) -> QueryResult<Value> {
         let values = args.iter().map(|arg| self.value(arg)).collect::<Result<Vec<_>, _>>()?;
         let Some(numbers) = super::windows::fitting(name, args, &values) else { return self.unfit(ast, &values) };
         scalar(name, &values, &numbers).map_or_else(|| self.unfit(ast, &values), Ok)

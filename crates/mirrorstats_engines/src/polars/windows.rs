@@ -2,7 +2,7 @@
 //!
 //! Polars computes a window with an order in the order of the frame, which is sorted before.
 
-use polars::prelude::{DataType, Expr, col, lit};
+use polars::prelude::{DataType, Expr, NULL, col, lit, when};
 use sqlparser::ast::{
     DuplicateTreatment, Expr as Ast, Function, FunctionArg, FunctionArgExpr, FunctionArguments, OrderByExpr,
     Spanned as _, UnaryOperator, Value as Literal, ValueWithSpan, WindowSpec, WindowType,
@@ -10,7 +10,7 @@ use sqlparser::ast::{
 
 use super::accepted::{Arg, Kind, Role, Signature, is_aggregate, named};
 use super::functions::{Aggregate, aggregate, running};
-use super::refused::{QueryError, unsupported};
+use super::refused::{QueryError, QueryResult, unsupported};
 use super::scope::Scope;
 use super::value::{Value, common};
 use mirrorstats_exact::suggest::nearest;
@@ -30,8 +30,6 @@ pub(super) struct Window {
     /// New columns. A step may read the columns of the step before it.
     pub(super) steps: Vec<Vec<Expr>>,
 }
-
-type Answer<T = Value> = Result<T, QueryError>;
 
 /// The numbers among the arguments of a call; `None` if no signature fits.
 pub(super) fn fitting(name: &str, args: &[&Ast], values: &[Value]) -> Option<Vec<i64>> {
@@ -93,32 +91,45 @@ pub(super) fn is_aggregate_call(ast: &Ast) -> bool {
     matches!(ast, Ast::Function(function) if function.over.is_none() && is_aggregate(&function.name.to_string()))
 }
 
+/// A call of a function: the name in lowercase.
+#[derive(Clone, Copy)]
+struct Call<'a> {
+    ast: &'a Ast,
+    name: &'a str,
+    args: &'a [&'a FunctionArgExpr],
+}
+
+impl<'a> Call<'a> {
+    /// The arguments, unless one is `*`.
+    fn expressions(self) -> Option<Vec<&'a Ast>> {
+        let plain = |arg: &&'a FunctionArgExpr| if let FunctionArgExpr::Expr(arg) = *arg { Some(arg) } else { None };
+        self.args.iter().map(plain).collect()
+    }
+}
+
 impl Scope<'_, '_> {
-    pub(super) fn function(&mut self, ast: &Ast, function: &Function) -> Answer {
+    pub(super) fn function(&mut self, ast: &Ast, function: &Function) -> QueryResult<Value> {
         let name = function.name.to_string().to_ascii_lowercase();
-        let name = if name == "substr" { "substring".to_owned() } else { name };
-        let Some(role) = named(&name).map(|signature| signature.role).next() else {
-            return self.no_function(ast, &name);
+        let name = if name == "substr" { "substring" } else { &name };
+        let Some(role) = named(name).map(|signature| signature.role).next() else {
+            return self.no_function(ast, name);
         };
         let Some((args, distinct)) = arguments(function) else { return self.unsupported(ast) };
+        let call = Call { ast, name, args: &args };
         if let Some(window) = &function.over {
-            return self.over(ast, &name, (&args, distinct || function.filter.is_some()), window);
+            return self.over(call, role, distinct || function.filter.is_some(), window);
         }
         match role {
-            Role::Scalar if !distinct && function.filter.is_none() => {
-                let plain = |arg: &&FunctionArgExpr| {
-                    if let FunctionArgExpr::Expr(arg) = *arg { Some(arg.clone()) } else { None }
-                };
-                let args: Option<Vec<Ast>> = args.iter().map(plain).collect();
-                let Some(args) = args else { return self.unsupported(ast) };
-                self.call(ast, &name, &args.iter().collect::<Vec<_>>())
-            }
-            Role::Aggregate | Role::Running => self.of_group(ast, &name, &args, distinct, function.filter.as_deref()),
+            Role::Scalar if !distinct && function.filter.is_none() => match call.expressions() {
+                Some(args) => self.call(ast, name, &args),
+                None => self.unsupported(ast),
+            },
+            Role::Aggregate | Role::Running => self.of_group(call, distinct, function.filter.as_deref()),
             _ => self.unsupported(ast),
         }
     }
 
-    fn no_function(&self, ast: &Ast, name: &str) -> Answer {
+    fn no_function(&self, ast: &Ast, name: &str) -> QueryResult<Value> {
         let names = super::accepted::FUNCTIONS.iter().map(|signature| signature.name);
         let error = unsupported(self.source(), ast.span(), format!("the function `{name}`"));
         Err(match (error, nearest(name, names)) {
@@ -130,7 +141,7 @@ impl Scope<'_, '_> {
     }
 
     /// The argument of an aggregate; rows are counted as a constant.
-    fn argument(&mut self, ast: &Ast, name: &str, args: &[&FunctionArgExpr]) -> Answer {
+    fn argument(&mut self, Call { ast, name, args }: Call<'_>) -> QueryResult<Value> {
         match args {
             [FunctionArgExpr::Wildcard] | [] if name == "count" => Ok(Value::int(lit(1_i64), 1)),
             [FunctionArgExpr::Expr(arg)] => {
@@ -142,32 +153,26 @@ impl Scope<'_, '_> {
         }
     }
 
-    fn of_group(
-        &mut self,
-        ast: &Ast,
-        name: &str,
-        args: &[&FunctionArgExpr],
-        distinct: bool,
-        filter: Option<&Ast>,
-    ) -> Answer {
+    fn of_group(&mut self, call: Call<'_>, distinct: bool, filter: Option<&Ast>) -> QueryResult<Value> {
+        let Call { ast, name, .. } = call;
         if let Some(place) = self.rows_of {
             let message = format!("the aggregate `{name}` is in {place}, where rows are meant");
             return self.wrong(ast.span(), message, Some("move it to HAVING or to a subquery in FROM".to_owned()));
         }
         let (value, filter) = self.rows("an aggregate", |scope| {
-            let value = scope.argument(ast, name, args)?;
+            let value = scope.argument(call)?;
             Ok((value, filter.map(|filter| scope.truth(filter)).transpose()?))
         })?;
         if distinct && (name != "count" || !value.is_exact()) {
             return self.unsupported(ast);
         }
         // A filtered row is a null, which every aggregate leaves out.
-        let kept = |expr: Expr| match filter {
-            Some(met) => polars::prelude::when(met).then(expr).otherwise(lit(polars::prelude::NULL)),
-            None => expr,
+        let kept = match filter {
+            Some(met) => when(met).then(value.expr.clone()).otherwise(lit(NULL)),
+            None => value.expr.clone(),
         };
         let column = self.planner.fresh();
-        self.prepared.push(kept(value.expr.clone()).alias(column.as_str()));
+        self.prepared.push(kept.alias(column.as_str()));
         let column = Value { expr: col(column.as_str()), ..value };
         let found = if distinct { Some(distinct_count(&column)) } else { aggregate(name, &column) };
         let Some(found) = found else { return self.unfit(ast, &[column]) };
@@ -180,27 +185,23 @@ impl Scope<'_, '_> {
         Ok((found.value)(&parts, found.bits))
     }
 
-    fn over(&mut self, ast: &Ast, name: &str, args: (&[&FunctionArgExpr], bool), window: &WindowType) -> Answer {
-        let (args, special) = args;
-        let WindowType::WindowSpec(spec) = window else { return self.unsupported(ast) };
+    fn over(&mut self, call: Call<'_>, role: Role, special: bool, window: &WindowType) -> QueryResult<Value> {
+        let WindowType::WindowSpec(spec) = window else { return self.unsupported(call.ast) };
         let only_parts = spec.window_name.is_none() && spec.window_frame.is_none();
         if special || !only_parts || self.rows_of.is_some() {
-            return self.unsupported(ast);
+            return self.unsupported(call.ast);
         }
         let (mut window, partition) = self.window(spec)?;
-        let role = named(name).map(|signature| signature.role).next();
         let value = match (role, window.order.is_empty()) {
-            (Some(Role::Window), _) => self.ranked(ast, name, args, &mut window, &partition)?,
-            (Some(Role::Aggregate | Role::Running), true) | (Some(Role::Running), false) => {
-                self.whole_or_running(ast, name, args, &mut window, &partition)?
-            }
-            _ => return self.unsupported(ast),
+            (Role::Window, _) => self.ranked(call, &mut window, &partition)?,
+            (Role::Running, _) | (Role::Aggregate, true) => self.whole_or_running(call, &mut window, &partition)?,
+            _ => return self.unsupported(call.ast),
         };
         self.windows.push(window);
         Ok(value)
     }
 
-    fn window(&mut self, spec: &WindowSpec) -> Answer<(Window, Vec<Expr>)> {
+    fn window(&mut self, spec: &WindowSpec) -> QueryResult<(Window, Vec<Expr>)> {
         let mut window = Window { prepared: Vec::new(), order: Vec::new(), steps: Vec::new() };
         // Polars has no window without a partition.
         let mut partition = vec![self.prepare(&mut window, lit(0_i64))];
@@ -217,12 +218,12 @@ impl Scope<'_, '_> {
     }
 
     /// A value by which rows are sorted or grouped.
-    pub(super) fn exact(&mut self, ast: &Ast) -> Answer {
+    pub(super) fn exact(&mut self, ast: &Ast) -> QueryResult<Value> {
         let value = self.value(ast)?;
         if value.is_exact() { Ok(value) } else { self.unfit(ast, &[value]) }
     }
 
-    pub(super) fn order(&self, key: &OrderByExpr, expr: &Expr) -> Answer<Order> {
+    pub(super) fn order(&self, key: &OrderByExpr, expr: &Expr) -> QueryResult<Order> {
         let Expr::Column(inner) = expr else { return self.unsupported(&key.expr) };
         if key.with_fill.is_some() {
             return self.unsupported(&key.expr);
@@ -238,7 +239,7 @@ impl Scope<'_, '_> {
     }
 
     /// Adds a step with one column for each part.
-    fn step(&mut self, window: &mut Window, parts: Vec<Expr>, over: &[Expr]) -> Answer<Vec<Expr>> {
+    fn step(&mut self, window: &mut Window, parts: Vec<Expr>, over: &[Expr]) -> QueryResult<Vec<Expr>> {
         let (mut step, mut columns) = (Vec::new(), Vec::new());
         for part in parts {
             let name = self.planner.fresh();
@@ -253,15 +254,9 @@ impl Scope<'_, '_> {
         partition.iter().cloned().chain(window.order.iter().map(|order| col(order.inner.as_str()))).collect()
     }
 
-    fn whole_or_running(
-        &mut self,
-        ast: &Ast,
-        name: &str,
-        args: &[&FunctionArgExpr],
-        window: &mut Window,
-        partition: &[Expr],
-    ) -> Answer {
-        let value = self.argument(ast, name, args)?;
+    fn whole_or_running(&mut self, call: Call<'_>, window: &mut Window, partition: &[Expr]) -> QueryResult<Value> {
+        let Call { ast, name, .. } = call;
+        let value = self.argument(call)?;
         let column = Value { expr: self.prepare(window, value.expr.clone()), ..value };
         let ordered = !window.order.is_empty();
         let found = if ordered { running(name, &column) } else { aggregate(name, &column) };
@@ -275,20 +270,11 @@ impl Scope<'_, '_> {
         Ok(value(&parts, bits))
     }
 
-    fn ranked(
-        &mut self,
-        ast: &Ast,
-        name: &str,
-        args: &[&FunctionArgExpr],
-        window: &mut Window,
-        partition: &[Expr],
-    ) -> Answer {
-        let plain =
-            |arg: &&FunctionArgExpr| if let FunctionArgExpr::Expr(arg) = *arg { Some(arg.clone()) } else { None };
-        let asts: Option<Vec<Ast>> = args.iter().map(plain).collect();
-        let Some(asts) = asts else { return self.unsupported(ast) };
+    fn ranked(&mut self, call: Call<'_>, window: &mut Window, partition: &[Expr]) -> QueryResult<Value> {
+        let Call { ast, name, .. } = call;
+        let Some(asts) = call.expressions() else { return self.unsupported(ast) };
         let values = asts.iter().map(|arg| self.value(arg)).collect::<Result<Vec<_>, _>>()?;
-        let fit = fitting(name, &asts.iter().collect::<Vec<_>>(), &values);
+        let fit = fitting(name, &asts, &values);
         let Some(numbers) = fit.filter(|_| !window.order.is_empty()) else { return self.unfit(ast, &values) };
         if let Some(value) = values.first().filter(|value| common([*value]).is_some()) {
             let back = numbers.first().copied().unwrap_or(1) * if name == "lag" { 1 } else { -1 };

@@ -30,7 +30,7 @@ use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::diagnostic::Finding;
 
 use self::answer::{Answer, Done};
-use self::request::{Place, Request};
+use self::request::{Place, Request, TABLE};
 use self::setting::Setting;
 use self::source::Sources;
 
@@ -116,7 +116,7 @@ pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError
     let place = Place::new()?;
     let request = Request::new(job, cluster, &place, None)?;
     finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
-    answer::table(&place.table(), job)
+    answer::table(&place.path(TABLE), job)
 }
 
 /// Scores on Spark, which writes the table as a folder of Parquet with the definitions in every file.

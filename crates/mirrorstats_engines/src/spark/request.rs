@@ -18,6 +18,9 @@ use mirrorstats_trace::schema;
 const KEYS: [(&str, &str); 5] =
     [("episode_id", "string"), ("model", "string"), ("experiment", "string"), ("seed", "int"), ("run", "int")];
 
+pub(super) const TABLE: &str = "table.jsonl";
+pub(super) const ANSWER: &str = "answer.json";
+
 /// The private folder of one submission: its request and the driver's answer.
 pub(super) struct Place(TemporaryFolder);
 
@@ -28,20 +31,12 @@ impl Place {
         made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
     }
 
-    pub(super) fn table(&self) -> PathBuf {
-        self.0.path().join("table.jsonl")
-    }
-
-    pub(super) fn answer(&self) -> PathBuf {
-        self.0.path().join("answer.json")
-    }
-
-    pub(super) fn log(&self) -> PathBuf {
-        self.0.path().join("log")
+    pub(super) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
     }
 
     pub(super) fn file(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, SparkError> {
-        let path = self.0.path().join(name);
+        let path = self.path(name);
         fs::write(&path, bytes)
             .map_err(|source| SparkError::System { what: "write a temporary file".into(), source })?;
         Ok(path)
@@ -95,8 +90,8 @@ impl Request {
             results: results(job),
             metadata: metadata(job)?,
             folder,
-            table: place.table().display().to_string(),
-            answer: place.answer().display().to_string(),
+            table: place.path(TABLE).display().to_string(),
+            answer: place.path(ANSWER).display().to_string(),
             optional: optional(&columns, job),
             columns,
         })

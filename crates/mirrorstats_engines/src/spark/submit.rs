@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use super::answer::Answer;
 use super::locate::{Spark, locate};
-use super::request::{Place, Request};
+use super::request::{ANSWER, Place, Request};
 use super::{Cluster, SparkError, cause};
 
 const DRIVER: &str = include_str!("../../../../assets/spark/driver.py");
@@ -39,7 +39,7 @@ pub(super) fn submit(request: &Request, cluster: &Cluster, place: &Place) -> Res
     let spark = locate()?;
     reach(cluster)?;
     let request = serde_json::to_vec(request).map_err(|error| SparkError::Answer { words: error.to_string() })?;
-    let log = cluster.log.clone().unwrap_or_else(|| place.log());
+    let log = cluster.log.clone().unwrap_or_else(|| place.path("log"));
     let open = |what: &str| {
         let file = File::create(&log).and_then(|file| Ok((file.try_clone()?, file)));
         file.map_err(|source| SparkError::System { what: format!("write {what}"), source })
@@ -50,7 +50,7 @@ pub(super) fn submit(request: &Request, cluster: &Cluster, place: &Place) -> Res
     let child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn();
     let started = |source| SparkError::System { what: format!("start `{}`", spark.program.display()), source };
     Running(child.map_err(started)?).wait().map_err(started)?;
-    match fs::read(place.answer()) {
+    match fs::read(place.path(ANSWER)) {
         Ok(answer) => serde_json::from_slice(&answer).map_err(|error| SparkError::Answer { words: error.to_string() }),
         Err(_) => Err(cause::of_log(&fs::read(&log).unwrap_or_default(), cluster)),
     }

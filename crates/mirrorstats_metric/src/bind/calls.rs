@@ -34,13 +34,13 @@ impl Scope<'_, '_> {
         Some(bound)
     }
 
-    pub(super) fn apply(&mut self, entry: &Entry, arguments: &[Expr], whole: &Expr) -> Option<Bound> {
+    fn apply(&mut self, entry: &Entry, arguments: &[Expr], whole: &Expr) -> Option<Bound> {
         match entry.function {
-            Function::First => self.predicate(Aggregate::First, Type::Int, &arguments[0], entry),
-            Function::Last => self.predicate(Aggregate::Last, Type::Int, &arguments[0], entry),
-            Function::Any => self.predicate(Aggregate::Any, Type::Bool, &arguments[0], entry),
-            Function::All => self.predicate(Aggregate::All, Type::Bool, &arguments[0], entry),
-            Function::Count => self.predicate(Aggregate::Count, Type::Int, &arguments[0], entry),
+            Function::First => self.predicate((Aggregate::First, Type::Int), &arguments[0], entry),
+            Function::Last => self.predicate((Aggregate::Last, Type::Int), &arguments[0], entry),
+            Function::Any => self.predicate((Aggregate::Any, Type::Bool), &arguments[0], entry),
+            Function::All => self.predicate((Aggregate::All, Type::Bool), &arguments[0], entry),
+            Function::Count => self.predicate((Aggregate::Count, Type::Int), &arguments[0], entry),
             Function::Min => self.extreme(Aggregate::Min, &arguments[0]),
             Function::Max => self.extreme(Aggregate::Max, &arguments[0]),
             Function::Sum => self.sum(&arguments[0]),
@@ -54,13 +54,7 @@ impl Scope<'_, '_> {
         }
     }
 
-    pub(super) fn predicate(
-        &mut self,
-        aggregate: Aggregate,
-        ty: Type,
-        argument: &Expr,
-        entry: &Entry,
-    ) -> Option<Bound> {
+    fn predicate(&mut self, (aggregate, ty): (Aggregate, Type), argument: &Expr, entry: &Entry) -> Option<Bound> {
         let bound = self.bind(argument)?;
         match bound.ty {
             Some(Type::Bool) => Some(self.aggregate(aggregate, ty, bound)),
@@ -86,7 +80,7 @@ impl Scope<'_, '_> {
         self.unary(Op::Aggregate(aggregate, node), ty, Level::Episode)
     }
 
-    pub(super) fn extreme(&mut self, aggregate: Aggregate, argument: &Expr) -> Option<Bound> {
+    fn extreme(&mut self, aggregate: Aggregate, argument: &Expr) -> Option<Bound> {
         let bound = self.number(argument)?;
         let ty = bound.ty?;
         Some(self.aggregate(aggregate, ty, bound))

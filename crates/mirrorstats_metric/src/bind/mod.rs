@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use indexmap::IndexMap;
 
 use self::scope::Scope;
-use super::columns::{Columns, Level, Type};
+use super::columns::{Columns, KnownColumn, Level, Type};
 use super::file::{Document, MetricEntry};
 use super::logical_plan::plan::{Builder, NodeId, Op, Plan};
 use super::syntax;
@@ -96,7 +96,8 @@ impl Binder<'_> {
         let lets = document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
         let metrics = document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));
         for (name, place, what) in lets.chain(metrics) {
-            let is_column = self.columns.is_reserved(name) || document.columns.contains_key(name);
+            let is_column =
+                self.columns.known(name).is_some_and(KnownColumn::is_of_schema) || document.columns.contains_key(name);
             if name.is_empty() || name.contains(|c: char| c == ',' || c.is_control()) {
                 let message = format!("`{}` is no name of a {}", visible(name), what.trim_matches('`'));
                 self.faults.push(Fault::new(place.clone(), message).help("a name has visible characters and no comma"));

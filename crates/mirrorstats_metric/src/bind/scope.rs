@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::columns::{Column, Fallback};
+use super::super::columns::{Column, Fallback, KnownColumn};
 use super::super::functions;
 use super::super::logical_plan::plan::{Arithmetic, Comparison, Constant, NodeId, Op};
 use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
@@ -29,7 +29,7 @@ impl Scope<'_, '_> {
         bound
     }
 
-    pub(super) fn bind_kind(&mut self, expr: &Expr) -> Option<Bound> {
+    fn bind_kind(&mut self, expr: &Expr) -> Option<Bound> {
         match &expr.kind {
             ExprKind::Name(name) => self.name(name, expr),
             ExprKind::Literal(literal) => Some(self.literal(literal)),
@@ -101,8 +101,10 @@ impl Scope<'_, '_> {
         if name == "t" {
             return Some(self.unary(Op::Time, Type::Int, Level::Step));
         }
-        let Some(column) = binder.columns.get(name) else { return self.unknown_name(name, expr) };
-        match binder.columns.fallback_of(name) {
+        let Some(&KnownColumn { column, fallback, .. }) = binder.columns.known(name) else {
+            return self.unknown_name(name, expr);
+        };
+        match fallback {
             None => Some(self.unary(Op::Column(name.to_owned()), column.ty, column.level)),
             Some(fallback) => self.column_or(name, column, fallback),
         }
@@ -123,7 +125,7 @@ impl Scope<'_, '_> {
         Some(self.combine(&[read, default], column.ty, |nodes| Op::Coalesce(nodes.to_vec())))
     }
 
-    pub(super) fn cycle<T>(&mut self, name: &str, expr: &Expr) -> Option<T> {
+    fn cycle<T>(&mut self, name: &str, expr: &Expr) -> Option<T> {
         let start = self.binder.underway.iter().position(|other| other == name).unwrap_or(0);
         let mut way = self.binder.underway[start..].to_vec();
         way.push(name.to_owned());
@@ -131,7 +133,7 @@ impl Scope<'_, '_> {
         self.binder.refuse(fault.label("here the circle closes").help(format!("the way is {}", way.join(" -> "))))
     }
 
-    pub(super) fn unknown_name<T>(&mut self, name: &str, expr: &Expr) -> Option<T> {
+    fn unknown_name<T>(&mut self, name: &str, expr: &Expr) -> Option<T> {
         let fault = Fault::new(self.place(expr), format!("unknown name `{name}`"));
         let document = self.binder.document;
         let known = document.lets.keys().chain(document.metrics.keys()).map(String::as_str);
@@ -162,7 +164,7 @@ impl Scope<'_, '_> {
         Some(self.unary(Op::Negate(inner.node), ty, inner.level))
     }
 
-    pub(super) fn binary(&mut self, op: BinaryOp, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {
+    fn binary(&mut self, op: BinaryOp, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {
         match op {
             BinaryOp::And | BinaryOp::Or => {
                 let (left, right) = (self.truth(left), self.truth(right));
@@ -176,13 +178,7 @@ impl Scope<'_, '_> {
         }
     }
 
-    pub(super) fn comparison(
-        &mut self,
-        comparison: Comparison,
-        left: &Expr,
-        right: &Expr,
-        whole: &Expr,
-    ) -> Option<Bound> {
+    fn comparison(&mut self, comparison: Comparison, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {
         let (a, b) = self.both(left, right)?;
         // Comparisons by order also make sense with other texts.
         if matches!(comparison, Comparison::Equal | Comparison::NotEqual) {

@@ -92,11 +92,11 @@ impl Scope<'_, '_> {
         Bound { node, ty: Some(ty), level: Level::Constant, rate: false }
     }
 
-    pub(super) fn as_int(&mut self, bound: Bound) -> Bound {
+    fn as_int(&mut self, bound: Bound) -> Bound {
         self.unary(Op::IntFromBool(bound.node), Type::Int, bound.level)
     }
 
-    pub(super) fn converted(&mut self, bound: Bound, ty: Type) -> Option<Bound> {
+    fn converted(&mut self, bound: Bound, ty: Type) -> Option<Bound> {
         match (bound.ty, ty) {
             (None, ty) => Some(self.null_of(ty)),
             (Some(from), to) if from == to => Some(bound),
@@ -115,7 +115,7 @@ impl Scope<'_, '_> {
     }
 
     /// The common type of these operands: equal types, widened numbers, and rates as 0 and 1 beside numbers.
-    pub(super) fn common_type(bounds: &[Bound]) -> Option<Type> {
+    fn common_type(bounds: &[Bound]) -> Option<Type> {
         let typed = || bounds.iter().filter_map(|bound| Some((bound.ty?, bound.rate)));
         let first = typed().next().map_or(Type::Bool, |(ty, _)| ty);
         if typed().all(|(ty, _)| ty == first) {

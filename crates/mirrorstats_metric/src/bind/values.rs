@@ -51,7 +51,8 @@ impl Binder<'_> {
             }
             match &self.builder.node(node).op {
                 Op::Column(name) => {
-                    possible.texts.extend_from_slice(self.columns.values(name)?);
+                    let values = &self.columns.known(name)?.values;
+                    possible.texts.extend_from_slice(Some(values).filter(|values| !values.is_empty())?);
                     possible.columns.push(name.clone());
                 }
                 Op::Constant(Constant::Text(text)) => possible.texts.push(text.clone()),

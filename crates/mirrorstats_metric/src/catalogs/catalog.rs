@@ -137,7 +137,7 @@ pub struct Experiment {
     /// Reference levels by metric: what some blind strategies would reach, where no chance level applies.
     pub reference: IndexMap<String, Vec<Ratio>>,
     /// True if the traces declare it, and the definitions do not know it; then the hash of the definitions is without it.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_declared: bool,
     /// The experiment that this one is the control of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -178,11 +178,6 @@ pub struct Control {
     /// The metrics to compare; all if absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub on: Vec<String>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
-const fn is_false(value: &bool) -> bool {
-    !*value
 }
 
 pub(crate) fn by_order(a: &String, one: &Experiment, b: &String, other: &Experiment) -> Ordering {

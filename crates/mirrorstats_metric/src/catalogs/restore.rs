@@ -34,9 +34,7 @@ impl Definitions {
         let found = definitions.catalog.hash;
         Err(RestoreError::Changed { name, expected: catalog.hash.clone(), found })
     }
-}
 
-impl Definitions {
     /// The definitions as one file, with what they include and the columns that they declare, for a trace that carries
     /// them. [`Definitions::from_toml`] reads it.
     pub fn as_one_file(&self) -> String {

@@ -1,5 +1,4 @@
-//! The logical plan: typed operations, their text, their explanation, their ranges.
+//! The logical plan: typed operations, and their explanation in words.
 
 pub mod explain;
 pub mod plan;
-pub(crate) mod print;

@@ -147,6 +147,17 @@ impl Aggregate {
     }
 }
 
+mirrorstats_exact::names!(Comparison {
+    Equal: "=",
+    NotEqual: "<>",
+    Less: "<",
+    LessEqual: "<=",
+    Greater: ">",
+    GreaterEqual: ">="
+});
+
+mirrorstats_exact::names!(Arithmetic { Add: "+", Subtract: "-", Multiply: "*", Quotient: "div", Remainder: "%" });
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     pub name: String,
@@ -171,10 +182,6 @@ pub struct Plan {
 impl Plan {
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
-    }
-
-    pub fn ids(&self) -> impl DoubleEndedIterator<Item = NodeId> + use<> {
-        (0..self.nodes.len()).map(NodeId)
     }
 
     pub fn node(&self, id: NodeId) -> &Node {

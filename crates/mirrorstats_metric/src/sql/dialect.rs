@@ -41,13 +41,6 @@ impl Dialect {
         }
     }
 
-    pub fn output_alias(self, metric: &str) -> String {
-        match self {
-            Self::Portable => self.output_name(metric),
-            Self::Spark | Self::Duckdb => metric.to_owned(),
-        }
-    }
-
     pub(super) const fn matches(self) -> Option<&'static str> {
         match self {
             Self::Portable => None,

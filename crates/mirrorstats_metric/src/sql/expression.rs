@@ -140,8 +140,9 @@ impl Layout<'_> {
 
     fn items(&self, Windowed { condition, windows }: &Windowed) -> String {
         let item = format!("t{}", condition.index());
-        let window =
-            |(comparison, moment): &(Comparison, NodeId)| format!("{item} {comparison} {}", self.value(*moment));
+        let window = |(comparison, moment): &(Comparison, NodeId)| {
+            format!("{item} {} {}", comparison.name(), self.value(*moment))
+        };
         let windows: Vec<String> = windows.iter().map(window).collect();
         let list = format!("e1.{}", self.column('l', *condition));
         self.dialect.filtered(&list, &item, &windows.join(" AND "))
@@ -216,7 +217,7 @@ impl Layout<'_> {
             Op::Or(x, y) => format!("({} OR {})", self.truth(*x), self.truth(*y)),
             Op::Compare(comparison, x, y) => {
                 let (x, y) = (self.operand(*x), self.operand(*y));
-                format!("({x} {comparison} {y})")
+                format!("({x} {} {y})", comparison.name())
             }
             Op::Distinct(x, y) => {
                 let (x, y) = (self.operand(*x), self.operand(*y));
@@ -234,7 +235,7 @@ impl Layout<'_> {
         }
     }
 
-    pub(super) fn operand(&self, id: NodeId) -> String {
+    fn operand(&self, id: NodeId) -> String {
         if self.plan.node(id).ty == Type::Bool { self.truth_as_int(id) } else { self.value(id) }
     }
 

@@ -106,8 +106,8 @@ impl fmt::Display for BinaryOp {
         match self {
             Self::And => f.write_str("and"),
             Self::Or => f.write_str("or"),
-            Self::Compare(comparison) => comparison.fmt(f),
-            Self::Arithmetic(op) => op.fmt(f),
+            Self::Compare(comparison) => f.write_str(comparison.name()),
+            Self::Arithmetic(op) => f.write_str(op.name()),
         }
     }
 }

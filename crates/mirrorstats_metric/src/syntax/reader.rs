@@ -11,7 +11,8 @@ use crate::logical_plan::plan::{Arithmetic, Comparison};
 /// The deepest nesting of one expression.
 const DEEPEST: usize = 120;
 
-struct Told;
+/// The fault is reported already.
+struct Reported;
 
 /// Walks the parser's tree and keeps the constructs of the calculus.
 pub(super) struct Reader<'a> {
@@ -90,8 +91,8 @@ impl<'a> Reader<'a> {
         items.into_iter().collect()
     }
 
-    fn optional(&mut self, expr: Option<&ast::Expr>, depth: usize) -> Result<Option<Box<Expr>>, Told> {
-        expr.map(|expr| self.boxed(expr, depth).ok_or(Told)).transpose()
+    fn optional(&mut self, expr: Option<&ast::Expr>, depth: usize) -> Result<Option<Box<Expr>>, Reported> {
+        expr.map(|expr| self.boxed(expr, depth).ok_or(Reported)).transpose()
     }
 
     fn truth(&mut self, inner: &ast::Expr, truth: bool, negated: bool, depth: usize) -> Option<ExprKind> {

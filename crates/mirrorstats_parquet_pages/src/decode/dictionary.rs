@@ -9,10 +9,8 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use crate::column::Keys;
 use crate::error::Unsupported;
 
-pub(crate) enum Dictionary {
-    Texts(ArrayRef),
-    Ints(ArrayRef),
-}
+/// The distinct values of a column: texts or 64-bit integers.
+pub(crate) struct Dictionary(ArrayRef);
 
 impl Dictionary {
     pub(crate) fn texts(mut data: &[u8], count: usize) -> Result<Self, Unsupported> {
@@ -24,7 +22,7 @@ impl Dictionary {
             texts.append_value(std::str::from_utf8(text).map_err(|_| Unsupported)?);
             data = rest;
         }
-        Ok(Self::Texts(Arc::new(texts.finish())))
+        Ok(Self(Arc::new(texts.finish())))
     }
 
     pub(crate) fn ints(data: &[u8], count: usize, long: bool) -> Result<Self, Unsupported> {
@@ -34,44 +32,37 @@ impl Dictionary {
             data.as_chunks().0.iter().map(|bytes| i32::from_le_bytes(*bytes).into()).collect()
         };
         let ints = ints.get(..count).ok_or(Unsupported)?;
-        Ok(Self::Ints(Arc::new(Int64Array::from(ints.to_vec()))))
+        Ok(Self(Arc::new(Int64Array::from(ints.to_vec()))))
     }
 
     pub(crate) fn is_small(&self) -> bool {
-        let (Self::Texts(values) | Self::Ints(values)) = self;
-        values.len() <= 1 << u8::BITS
+        self.0.len() <= 1 << u8::BITS
     }
 
     /// One-byte keys and their values; the key of a null is 0.
     pub(crate) fn keys(&self, keys: Vec<u8>, nulls: Option<NullBuffer>) -> Result<Keys, Unsupported> {
-        let (Self::Texts(values) | Self::Ints(values)) = self;
         let keys = UInt8Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
-        Keys::new(keys, values.clone()).ok_or(Unsupported)
+        Keys::new(keys, Arc::clone(&self.0)).ok_or(Unsupported)
     }
 
     /// The values of keys; the key of a null is 0.
     pub(crate) fn values(&self, keys: Vec<i32>, nulls: Option<NullBuffer>) -> Result<ArrayRef, Unsupported> {
-        match self {
-            Self::Texts(texts) => {
-                let keys = Int32Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
-                let column = DictionaryArray::<Int32Type>::try_new(keys, texts.clone()).map_err(|_| Unsupported)?;
-                Ok(Arc::new(column))
-            }
-            Self::Ints(ints) => {
-                let ints = ints.as_primitive::<Int64Type>().values();
-                let mut within = true;
-                let value = |key: &i32| {
-                    let value = usize::try_from(*key).ok().and_then(|key| ints.get(key));
-                    within &= value.is_some();
-                    value.copied().unwrap_or_default()
-                };
-                let values: ScalarBuffer<i64> = keys.iter().map(value).collect();
-                let all_null = || nulls.as_ref().is_some_and(|nulls| nulls.null_count() == keys.len());
-                if !within && !all_null() {
-                    return Err(Unsupported);
-                }
-                Ok(Arc::new(Int64Array::try_new(values, nulls).map_err(|_| Unsupported)?))
-            }
+        let Some(ints) = self.0.as_primitive_opt::<Int64Type>() else {
+            let keys = Int32Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
+            let column = DictionaryArray::<Int32Type>::try_new(keys, Arc::clone(&self.0)).map_err(|_| Unsupported)?;
+            return Ok(Arc::new(column));
+        };
+        let mut within = true;
+        let value = |key: &i32| {
+            let value = usize::try_from(*key).ok().and_then(|key| ints.values().get(key));
+            within &= value.is_some();
+            value.copied().unwrap_or_default()
+        };
+        let values: ScalarBuffer<i64> = keys.iter().map(value).collect();
+        let all_null = || nulls.as_ref().is_some_and(|nulls| nulls.null_count() == keys.len());
+        if !within && !all_null() {
+            return Err(Unsupported);
         }
+        Ok(Arc::new(Int64Array::try_new(values, nulls).map_err(|_| Unsupported)?))
     }
 }

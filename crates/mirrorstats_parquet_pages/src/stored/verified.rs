@@ -110,7 +110,7 @@ impl Verified {
         self.keep(FaultKind::Corrupt, Part::Page(offset), expected.into(), found.to_string())
     }
 
-    pub(crate) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
+    fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
         self.keep(FaultKind::OverBudget, Part::Page(offset), exceeded.expected(), "more".to_owned())
     }
 

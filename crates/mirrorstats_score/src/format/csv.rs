@@ -162,13 +162,12 @@ pub(super) fn check_unique(names: &[&str]) -> Result<(), FormatError> {
     }
 }
 
+fn invalid(line: usize, column: &str, expected: &'static str, found: &str) -> FormatError {
+    FormatError::Value { line, column: column.to_owned(), expected, found: found.to_owned() }
+}
+
 fn required<'a>(cell: Option<&'a str>, line: usize, column: &str) -> Result<&'a str, FormatError> {
-    cell.ok_or_else(|| FormatError::Value {
-        line,
-        column: column.to_owned(),
-        expected: "a value",
-        found: String::new(),
-    })
+    cell.ok_or_else(|| invalid(line, column, "a value", ""))
 }
 
 /// An integer as data frames write it: `1.0` beside missing values, and `True` or `False`.
@@ -181,10 +180,5 @@ fn integer<T: std::str::FromStr>(text: &str, line: usize, column: &str) -> Resul
             .filter(|(_, zeros)| zeros.bytes().all(|zero| zero == b'0'))
             .map_or(text, |(whole, _)| whole),
     };
-    whole.parse().map_err(|_| FormatError::Value {
-        line,
-        column: column.to_owned(),
-        expected: "an integer",
-        found: text.to_owned(),
-    })
+    whole.parse().map_err(|_| invalid(line, column, "an integer", text))
 }

@@ -146,13 +146,7 @@ impl Evaluation<'_> {
                 let absent = BooleanArray::new(!&segments.exist(self.of(*moments).ints()), None);
                 Ok(Vector::Array(nullif(self.of(*values).array(), &absent)?))
             }
-            Kernel::Symbols(_)
-            | Kernel::KeysEqualText { .. }
-            | Kernel::KeysEqualEpisode { .. }
-            | Kernel::CompareTexts(..)
-            | Kernel::KeysMatch(..)
-            | Kernel::SymbolsMatch(..) => Ok(self.texts(id, &step.kernel)?),
-            kernel => Ok(self.elementwise(kernel, step.ty)?),
+            kernel => Ok(self.elementwise(id, kernel, step.ty)?),
         }
     }
 
@@ -236,8 +230,10 @@ impl Evaluation<'_> {
         }
     }
 
-    fn texts(&self, id: StepId, kernel: &Kernel) -> Result<Vector, ArrowError> {
+    fn elementwise(&self, id: StepId, kernel: &Kernel, ty: Type) -> Result<Vector, ArrowError> {
         let segments = self.batch.segments;
+        let bools = |id: StepId| self.of(id).bools();
+        let matches = |symbol| self.plan.pattern(id).is_match(self.symbols.text(symbol));
         Ok(match kernel {
             Kernel::Symbols(keys) => self.of(*keys).keyed().symbols().into(),
             Kernel::KeysEqualText { keys, text, equal } => {
@@ -255,28 +251,13 @@ impl Evaluation<'_> {
                 let operand = |id: StepId, array| Operand { array, is_one: self.plan.step(id).shape == Shape::One };
                 compare(*comparison, &operand(*x, &left), &operand(*y, &right))?.into()
             }
-            Kernel::KeysMatch(keys, _) => {
-                let matches = |symbol| self.plan.pattern(id).is_match(self.symbols.text(symbol));
-                self.of(*keys).keyed().test(matches).into()
-            }
-            Kernel::SymbolsMatch(symbols, _) => {
-                let matches = |symbol| self.plan.pattern(id).is_match(self.symbols.text(symbol));
-                test_symbols(self.of(*symbols).symbols(), matches).into()
-            }
-            _ => unreachable!("another kernel is none of texts"),
-        })
-    }
-
-    fn elementwise(&self, kernel: &Kernel, ty: Type) -> Result<Vector, ArrowError> {
-        let bools = |id: StepId| self.of(id).bools();
-        Ok(match kernel {
+            Kernel::KeysMatch(keys, _) => self.of(*keys).keyed().test(matches).into(),
+            Kernel::SymbolsMatch(symbols, _) => test_symbols(self.of(*symbols).symbols(), matches).into(),
             Kernel::Not(x) => boolean::not(bools(*x))?.into(),
             Kernel::And(x, y) => boolean::and_kleene(bools(*x), bools(*y))?.into(),
             Kernel::Or(x, y) => boolean::or_kleene(bools(*x), bools(*y))?.into(),
             Kernel::Compare(comparison, x, y) => compare(*comparison, &self.operand(*x), &self.operand(*y))?.into(),
-            Kernel::Window(comparison, moments) => {
-                self.batch.segments.window(*comparison, self.of(*moments).ints()).into()
-            }
+            Kernel::Window(comparison, moments) => segments.window(*comparison, self.of(*moments).ints()).into(),
             Kernel::Distinct(x, y) => cmp::distinct(&self.operand(*x), &self.operand(*y))?.into(),
             Kernel::IsNull(x) => boolean::is_null(self.of(*x).validity())?.into(),
             Kernel::IsTrue(x) => BooleanArray::new(truths(bools(*x)), None).into(),
@@ -291,7 +272,7 @@ impl Evaluation<'_> {
             Kernel::Coalesce(values) => coalesce(&values.iter().map(|id| self.of(*id)).collect::<Vec<_>>(), ty)?,
             Kernel::IntFromBool(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Int64)?),
             Kernel::FloatFromInt(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Float64)?),
-            _ => unreachable!("another kernel is none of single values"),
+            _ => unreachable!("`step` evaluates the other kernels"),
         })
     }
 }

@@ -290,7 +290,7 @@ pub(crate) fn truths(values: &BooleanArray) -> BooleanBuffer {
     }
 }
 
-pub(crate) fn nulls_of(valid: &[bool]) -> Option<NullBuffer> {
+fn nulls_of(valid: &[bool]) -> Option<NullBuffer> {
     if valid.iter().all(|&valid| valid) {
         None
     } else {

@@ -218,7 +218,7 @@ pub(crate) struct Symbols {
 }
 
 impl Symbols {
-    pub(crate) fn intern(&mut self, text: &str) -> u32 {
+    fn intern(&mut self, text: &str) -> u32 {
         if let Some(number) = self.numbers.get(text) {
             return *number;
         }

@@ -6,7 +6,6 @@
 //! Evaluation ([`super::kernels::evaluate`]) runs the steps in order and decides nothing.
 
 mod lower;
-mod print;
 mod window;
 mod work;
 
@@ -188,21 +187,17 @@ impl PhysicalPlan {
     pub fn of(plans: &[&Plan]) -> Self {
         let mut physical = Self::default();
         for plan in plans {
-            physical.add_scores(plan);
+            let mut lowering = lower::Lowering::new(&mut physical, plan);
+            let metrics = plan.outputs.iter().map(|output| Metric {
+                name: output.name.clone(),
+                kind: output.kind,
+                step: lowering.values(output.node),
+            });
+            let metrics = metrics.collect();
+            let filter = plan.filter.map(|node| lowering.values(node));
+            physical.scores.push(Scores { metrics, filter });
         }
         physical
-    }
-
-    pub(crate) fn add_scores(&mut self, plan: &Plan) {
-        let mut lowering = lower::Lowering::new(self, plan);
-        let metrics = plan.outputs.iter().map(|output| Metric {
-            name: output.name.clone(),
-            kind: output.kind,
-            step: lowering.values(output.node),
-        });
-        let metrics = metrics.collect();
-        let filter = plan.filter.map(|node| lowering.values(node));
-        self.scores.push(Scores { metrics, filter });
     }
 
     /// Adds nodes of some definitions, each in its own shape; returns their steps.
@@ -270,9 +265,15 @@ mod tests {
         Definitions::load("paper", &schema_columns()).unwrap()
     }
 
+    fn printed(plan: &PhysicalPlan) -> String {
+        let steps = plan.steps().iter().enumerate();
+        let steps = steps.map(|(at, step)| format!("%{at} {:?} {:?} {:?}\n", step.ty, step.shape, step.kernel));
+        steps.chain(plan.scores().iter().map(|scores| format!("{scores:?}\n"))).collect()
+    }
+
     #[test]
     fn the_plan_of_the_paper_matches_its_snapshot() {
-        insta::assert_snapshot!(PhysicalPlan::of(&[&paper().plan]));
+        insta::assert_snapshot!(printed(&PhysicalPlan::of(&[&paper().plan])));
     }
 
     #[test]
@@ -297,7 +298,9 @@ mod tests {
         value = "coalesce(at(regexp_like(self_color, '^b') or selected_cube < body_color, M), false)"
         "#;
         let definitions = Definitions::from_toml("test", text, &schema_columns()).unwrap();
-        insta::assert_snapshot!(PhysicalPlan::of(&[&definitions.plan]));
-        insta::assert_snapshot!("logical", definitions.plan);
+        insta::assert_snapshot!(printed(&PhysicalPlan::of(&[&definitions.plan])));
+        let nodes = definitions.plan.nodes().iter().enumerate();
+        let nodes = nodes.map(|(at, node)| format!("#{at} {:?} {:?} {:?}\n", node.ty, node.level, node.op));
+        insta::assert_snapshot!("logical", nodes.collect::<String>());
     }
 }

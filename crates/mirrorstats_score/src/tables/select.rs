@@ -5,18 +5,21 @@
 
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, BooleanArray, DictionaryArray, Int64Array, RecordBatch, RecordBatchOptions};
-use arrow::datatypes::{Field, Int32Type, Schema};
+use arrow::array::{ArrayRef, BooleanArray, RecordBatch, RecordBatchOptions};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Schema};
 use arrow::error::ArrowError;
 
 use crate::error::EngineError;
 use crate::kernels::evaluate::Batch;
 use crate::kernels::segments::Segments;
 use crate::physical::PhysicalPlan;
+use crate::tables::columns;
 use crate::tables::table::{EpisodeTable, LabelColumn};
 use mirrorstats_metric::columns::{Column, Columns, Level, Type};
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_metric::file::FileError;
+use mirrorstats_parquet_pages::text_type;
 use mirrorstats_toml_spec::Faults;
 use mirrorstats_trace::beside::labels;
 
@@ -53,9 +56,9 @@ pub fn select(
 }
 
 fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, SelectError> {
-    let values = columns(table);
+    let values = typed_columns(table)?;
     let columns: Columns =
-        values.iter().map(|(name, ty, _)| (*name, Column { ty: *ty, level: Level::Episode })).collect();
+        values.iter().map(|(name, ty, _)| (name.as_str(), Column { ty: *ty, level: Level::Episode })).collect();
     let columns = columns.with_help("scores have their keys and metrics alone; a condition on steps needs the traces");
     let none = match Definitions::from_toml("scores", "", &columns) {
         Ok(none) => none,
@@ -64,7 +67,7 @@ fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, Selec
     };
     let definitions = none.filtered("--where", condition, &columns)?;
     let offsets: Vec<usize> = (0..=table.len()).collect();
-    let fields = values.iter().map(|(name, _, array)| Field::new(*name, array.data_type().clone(), true));
+    let fields = values.iter().map(|(name, _, array)| Field::new(name, array.data_type().clone(), true));
     let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
     let episodes = RecordBatch::try_new(schema, values.into_iter().map(|(.., array)| array).collect())?;
     let steps = RecordBatch::try_new_with_options(
@@ -88,27 +91,18 @@ pub fn truths_of(label: &LabelColumn) -> impl Iterator<Item = Option<bool>> + '_
     label.values.iter().map(|text| text.map(|text| text == "true"))
 }
 
-fn columns(table: &EpisodeTable) -> Vec<(&str, Type, ArrayRef)> {
-    let text = |values: Vec<Option<&str>>| {
-        (Type::Text, Arc::new(values.into_iter().collect::<DictionaryArray<Int32Type>>()) as ArrayRef)
+fn typed_columns(table: &EpisodeTable) -> Result<Vec<(String, Type, ArrayRef)>, ArrowError> {
+    let schema = columns::schema(&table.header());
+    let typed = |(at, field): (usize, &Arc<Field>)| {
+        let label = table.labels.iter().find(|label| label.name == *field.name());
+        if let Some(label) = label.filter(|label| is_of_coders(label)) {
+            let truths = Arc::new(truths_of(label).collect::<BooleanArray>());
+            return Ok((label.name.clone(), Type::Bool, truths as ArrayRef));
+        }
+        let values = columns::values(table, at, 0..table.len())?;
+        let (ty, held) =
+            if *field.data_type() == DataType::Utf8 { (Type::Text, text_type()) } else { (Type::Int, DataType::Int64) };
+        Ok((field.name().clone(), ty, cast(&values, &held)?))
     };
-    let int = |values: Vec<Option<i64>>| (Type::Int, Arc::new(Int64Array::from(values)) as ArrayRef);
-    let keys = || table.keys.iter();
-    let mut columns = vec![
-        ("episode_id", text(keys().map(|key| Some(key.episode_id)).collect())),
-        ("model", text(keys().map(|key| Some(key.model)).collect())),
-        ("experiment", text(keys().map(|key| Some(key.experiment)).collect())),
-        ("seed", int(keys().map(|key| Some(key.seed.into())).collect())),
-        ("run", int(keys().map(|key| Some(key.run.into())).collect())),
-    ];
-    columns.extend(table.labels.iter().map(|label| {
-        let values = if is_of_coders(label) {
-            (Type::Bool, Arc::new(truths_of(label).collect::<BooleanArray>()) as ArrayRef)
-        } else {
-            text(label.values.iter().collect())
-        };
-        (label.name.as_str(), values)
-    }));
-    columns.extend(table.metrics.iter().map(|metric| (metric.name.as_str(), int(metric.iter().collect()))));
-    columns.into_iter().map(|(name, (ty, values))| (name, ty, values)).collect()
+    schema.fields().iter().enumerate().map(typed).collect()
 }

@@ -7,10 +7,10 @@ use arrow::array::{
 };
 use arrow::compute::take;
 
+use super::builder::default_text;
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_metric::catalogs::catalog::Catalog;
 pub use mirrorstats_trace::footers::declared::Declared;
-use mirrorstats_trace::schema::{self, Column};
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
 #[derive(Clone, Debug, PartialEq)]
@@ -128,7 +128,7 @@ impl EpisodeTable {
 
     /// Returns true if any episode was recorded under a condition other than the default.
     pub fn has_conditions(&self) -> bool {
-        let default = schema::column(CONDITION).and_then(Column::default_text);
+        let default = default_text(CONDITION);
         self.label(CONDITION).is_some_and(|column| column.iter().flatten().any(|condition| Some(condition) != default))
     }
 

@@ -61,8 +61,8 @@ impl Study {
         let wanted =
             score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader), unchecked: &UNCHECKED };
         let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
-        let Scored { tables: [episodes, ended], quality, .. } =
-            score_traces::score_each(traces, definitions, wanted, self.threads)?;
+        let Scored { tables, quality, .. } = score_traces::score_all(traces, &definitions, wanted, self.threads)?;
+        let [episodes, ended]: [_; 2] = tables.try_into().expect("a table per definitions");
         let lost = lost.map(|_| ids(&ended));
         let mut results = Results { lost, quality, ..Results::of(episodes) };
         self.declare(&mut results)?;

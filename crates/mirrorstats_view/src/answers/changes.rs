@@ -33,19 +33,19 @@ pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
         "cells_compared": changes.cells_compared,
         "rewritten": changes.rewritten,
         "cells": cells.collect::<Vec<_>>(),
-        "flips": changes.flips.iter().map(told).collect::<Vec<_>>(),
+        "flips": changes.flips.iter().map(entry).collect::<Vec<_>>(),
         "notes": found.notes,
     }))
 }
 
-fn told(flip: &Flip) -> Value {
-    let mut told = json!(flip);
+fn entry(flip: &Flip) -> Value {
+    let mut entry = json!(flip);
     // A browser would round large numbers.
-    told["value"] = json!({
+    entry["value"] = json!({
         "before": flip.value.before.map(|value| value.to_string()),
         "after": flip.value.after.map(|value| value.to_string()),
     });
-    told["id"] = json!(flip.episode.episode_id);
-    told["name"] = json!(visible(&flip.episode.episode_id));
-    told
+    entry["id"] = json!(flip.episode.episode_id);
+    entry["name"] = json!(visible(&flip.episode.episode_id));
+    entry
 }

@@ -26,10 +26,10 @@ pub(crate) const LONGEST: usize = 4_000;
 pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let id = required(query, "id")?;
     let opened = snapshot.episode(id)?;
-    let mut told = about(snapshot, &opened, LONGEST)?;
-    told["siblings"] = list::siblings(snapshot, id).into();
-    told["neighbours"] = list::neighbours(snapshot, query, id)?;
-    Ok(told)
+    let mut entry = about(snapshot, &opened, LONGEST)?;
+    entry["siblings"] = list::siblings(snapshot, id).into();
+    entry["neighbours"] = list::neighbours(snapshot, query, id)?;
+    Ok(entry)
 }
 
 /// An episode without its position in a list, its texts cut to `longest` characters. An unreadable log hides nothing
@@ -39,14 +39,14 @@ pub(crate) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Res
         Ok(first) => (first, None),
         Err(error) => (None, Some(ViewError::from(error).words())),
     };
-    let mut told = described(snapshot, opened, longest, first.as_ref(), scores(snapshot, opened)?);
+    let mut entry = described(snapshot, opened, longest, first.as_ref(), scores(snapshot, opened)?);
     if let Some(fault) = fault {
-        told["log_fault"] = fault.into();
-    } else if told["frames"] == false && snapshot.renders(opened) {
-        told["frames"] = true.into();
-        told["rendered"] = true.into();
+        entry["log_fault"] = fault.into();
+    } else if entry["frames"] == false && snapshot.renders(opened) {
+        entry["frames"] = true.into();
+        entry["rendered"] = true.into();
     }
-    Ok(told)
+    Ok(entry)
 }
 
 /// An episode without its position in a list; `first` is the log's record of its first step.
@@ -132,8 +132,8 @@ fn steps(opened: &Opened, longest: usize) -> Value {
     if let Some(own) = &opened.own {
         for column in own {
             let values: Vec<Option<Value>> = column.values().map(|value| Some(displayed(value?, longest))).collect();
-            let told = json!({"doc": "", "unit": null, "is_number": column.is_numeric(), "values": values});
-            all.insert(column.name.clone(), told);
+            let entry = json!({"doc": "", "unit": null, "is_number": column.is_numeric(), "values": values});
+            all.insert(column.name.clone(), entry);
         }
         return Value::Object(all);
     }
@@ -145,8 +145,8 @@ fn steps(opened: &Opened, longest: usize) -> Value {
         let is_number = matches!(column.stored.kind(), Kind::Int | Kind::Float);
         let values: Vec<Option<Value>> =
             values.into_iter().map(|value| Some(shown(value?, column.stored, longest))).collect();
-        let told = json!({"doc": column.doc, "unit": column.unit, "is_number": is_number, "values": values});
-        all.insert(column.name.to_owned(), told);
+        let entry = json!({"doc": column.doc, "unit": column.unit, "is_number": is_number, "values": values});
+        all.insert(column.name.to_owned(), entry);
     }
     Value::Object(all)
 }
@@ -190,9 +190,9 @@ fn lines(text: &str) -> String {
 pub(crate) fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Value), ViewError> {
     let (Some(scored), Some(input)) = (&snapshot.scored, &opened.input) else { return Ok((json!([]), Value::Null)) };
     let id = &opened.episode.episode_id;
-    let own = told(&scored.study.explain_in(input, id)?);
+    let own = entry(&scored.study.explain_in(input, id)?);
     let Some(study) = other_study(snapshot, input)? else { return Ok((own, Value::Null)) };
-    Ok((own, told(&study.explain_in(input, id)?)))
+    Ok((own, entry(&study.explain_in(input, id)?)))
 }
 
 /// The same for some episodes of a trace, by id.
@@ -206,8 +206,8 @@ pub(crate) fn scores_of(
         Some(study) => study.explain_each_in(input, ids)?,
         None => BTreeMap::new(),
     };
-    let against = |id: &String| other.get(id).map_or(Value::Null, told);
-    Ok(own.iter().map(|(id, evidence)| (id.clone(), (told(evidence), against(id)))).collect())
+    let against = |id: &String| other.get(id).map_or(Value::Null, entry);
+    Ok(own.iter().map(|(id, evidence)| (id.clone(), (entry(evidence), against(id)))).collect())
 }
 
 /// The trace under the other definitions, if any.
@@ -218,7 +218,7 @@ fn other_study(snapshot: &Snapshot, input: &Input) -> Result<Option<Study>, View
     Scored::study(options, vec![input.clone()], question).map(Some)
 }
 
-fn told(evidence: &Evidence) -> Value {
+fn entry(evidence: &Evidence) -> Value {
     let metric = |metric: &MetricEvidence| {
         let facts = metric.facts.iter().map(|fact| {
             json!({

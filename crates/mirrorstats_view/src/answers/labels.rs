@@ -27,8 +27,8 @@ struct Asked {
 /// The marks of an episode, followed by those of its steps.
 pub(crate) fn of_episode(snapshot: &Snapshot, id: &str) -> Value {
     let labels = snapshot.scored.as_ref().and_then(|scored| scored.study.traces().ok()).map(TraceSet::labels);
-    let told = |Mark { coder, step, label, note }: Mark<'_>| json!({"coder": visible(coder), "step": step, "label": label, "note": note.map(visible_lines)});
-    labels.map_or_else(|| json!([]), |labels| labels.of_episode(id).map(told).collect())
+    let entry = |Mark { coder, step, label, note }: Mark<'_>| json!({"coder": visible(coder), "step": step, "label": label, "note": note.map(visible_lines)});
+    labels.map_or_else(|| json!([]), |labels| labels.of_episode(id).map(entry).collect())
 }
 
 pub(crate) fn of_row(table: &EpisodeTable, row: usize) -> Vec<&str> {

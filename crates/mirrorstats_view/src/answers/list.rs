@@ -24,12 +24,12 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     let limit = number(query, "limit")?.unwrap_or(100).min(MOST);
     let said = Filter::of(query).words().map(|words| snapshot.said(words)).transpose()?;
     let with_words = |table: &EpisodeTable, row: usize| {
-        let mut told = told(table, row);
+        let mut entry = entry(table, row);
         if let Some(found) = said.as_ref().and_then(|said| said.get(table.keys.get(row).episode_id)) {
             let (t, column, excerpt) = (found.t, visible(&found.column), visible(&found.excerpt));
-            told["said"] = json!({"t": t, "column": column, "excerpt": excerpt, "steps": found.steps});
+            entry["said"] = json!({"t": t, "column": column, "excerpt": excerpt, "steps": found.steps});
         }
-        told
+        entry
     };
     let page: Vec<usize> = rows[offset..].iter().take(limit).copied().collect();
     Ok(json!({
@@ -77,15 +77,15 @@ pub(crate) fn everything(snapshot: &Snapshot) -> Result<Value, ViewError> {
 }
 
 fn with_keys(table: &EpisodeTable, row: usize) -> Value {
-    let mut told = told(table, row);
+    let mut entry = entry(table, row);
     let (key, condition) = (table.keys.get(row), condition_of(table, row));
     let keys = json!({"experiment": key.experiment, "model": key.model, "condition": condition});
-    if COLUMNS.iter().any(|column| told[column] != keys[column]) {
-        told["keys"] = keys;
+    if COLUMNS.iter().any(|column| entry[column] != keys[column]) {
+        entry["keys"] = keys;
     }
     let labels = table.labels.iter().map(|label| (label.name.clone(), json!(label.values.get(row))));
-    told["labels"] = labels.collect::<serde_json::Map<_, _>>().into();
-    told
+    entry["labels"] = labels.collect::<serde_json::Map<_, _>>().into();
+    entry
 }
 
 pub(crate) fn neighbours(snapshot: &Snapshot, query: &Query, id: &str) -> Result<Value, ViewError> {
@@ -150,7 +150,7 @@ fn sorted(snapshot: &Snapshot, query: &Query) -> Result<Vec<usize>, ViewError> {
     Ok(rows)
 }
 
-fn told(table: &EpisodeTable, row: usize) -> Value {
+fn entry(table: &EpisodeTable, row: usize) -> Value {
     let key = table.keys.get(row);
     let value = |metric: &MetricColumn| metric.get(row).map(|value| value.to_string());
     json!({

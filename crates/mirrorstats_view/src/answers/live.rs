@@ -38,7 +38,7 @@ impl View {
         }
         let snapshot = self.newest();
         let watch = self.watch.lock().unwrap_or_else(PoisonError::into_inner);
-        let running: Vec<Value> = snapshot.running.iter().map(told).collect();
+        let running: Vec<Value> = snapshot.running.iter().map(entry).collect();
         json!({
             "generation": snapshot.generation,
             "episodes": snapshot.episodes(),
@@ -97,7 +97,7 @@ impl Watch {
     }
 }
 
-fn told(Running { episode, .. }: &Running) -> Value {
+fn entry(Running { episode, .. }: &Running) -> Value {
     let last = episode.steps.last();
     let cost: f64 = episode.steps.iter().filter_map(|step| step.extra.cost_usd).sum();
     let statuses = episode.steps.iter().filter_map(|step| step.extra.reply_status.as_deref());

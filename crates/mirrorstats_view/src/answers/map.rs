@@ -20,8 +20,8 @@ pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     // The episode's page reports an unreadable log.
     let mut map = Map::default();
     Ok(match snapshot.logs.each_shapes(&opened, &mut |t, shapes| map.add(t, &shapes)) {
-        Ok(()) => map.told(opened.episode.steps.len()),
-        Err(_) => Map::default().told(0),
+        Ok(()) => map.into_json(opened.episode.steps.len()),
+        Err(_) => Map::default().into_json(0),
     })
 }
 
@@ -77,7 +77,7 @@ impl Map {
         self.steps.values_mut().flatten().for_each(|at| *at = places[at]);
     }
 
-    pub fn told(self, length: usize) -> Value {
+    pub fn into_json(self, length: usize) -> Value {
         let mut shapes: Vec<(usize, Drawn)> = self.shapes.into_iter().map(|(drawn, at)| (at, drawn)).collect();
         shapes.sort_unstable();
         let shapes: Vec<Drawn> = shapes.into_iter().map(|(_, drawn)| drawn).collect();
@@ -171,9 +171,9 @@ mod tests {
     fn a_body_is_drawn_as_an_outline_and_a_head() {
         let mut map = Map::default();
         map.add(1, &[shape("agent0_head", 1.0), shape("agent0_left_foot", 0.5), shape("agent0_torso", 1.0)]);
-        let told = map.told(1);
-        assert_eq!(told["names"], serde_json::json!(["agent0_head", "agent0"]));
-        let outline = told["shapes"][1].as_array().unwrap()[4..].iter().step_by(2).map(|x| x.as_i64().unwrap());
+        let entry = map.into_json(1);
+        assert_eq!(entry["names"], serde_json::json!(["agent0_head", "agent0"]));
+        let outline = entry["shapes"][1].as_array().unwrap()[4..].iter().step_by(2).map(|x| x.as_i64().unwrap());
         assert_eq!((outline.clone().min(), outline.max()), (Some(40), Some(110)));
     }
 
@@ -183,10 +183,10 @@ mod tests {
         for t in 1..=3_u32 {
             map.add(t as usize, &[shape("cube0", 1.0), shape("agent0", f64::from(t))]);
         }
-        let told = map.told(3);
-        assert_eq!(told["still"], serde_json::json!([0]));
-        assert_eq!(told["steps"], serde_json::json!([[1], [2], [3]]));
-        assert_eq!(told["shapes"][2], serde_json::json!([1, 0, 50, 10, 200, 0]));
+        let entry = map.into_json(3);
+        assert_eq!(entry["still"], serde_json::json!([0]));
+        assert_eq!(entry["steps"], serde_json::json!([[1], [2], [3]]));
+        assert_eq!(entry["shapes"][2], serde_json::json!([1, 0, 50, 10, 200, 0]));
     }
 
     #[test]
@@ -197,11 +197,11 @@ mod tests {
             let x = f64::from(u32::try_from(t).unwrap());
             map.add(t, &[shape("cube0", 1.0), shape("agent0", x)]);
         }
-        let told = map.told(length);
-        let (every, shapes) = (told["every"].as_u64().unwrap(), told["shapes"].as_array().unwrap());
+        let entry = map.into_json(length);
+        let (every, shapes) = (entry["every"].as_u64().unwrap(), entry["shapes"].as_array().unwrap());
         assert!(every > 1 && shapes.len() <= MOST + 1, "{every}, {}", shapes.len());
-        let last = told["steps"].as_array().unwrap().last().unwrap()[0].as_u64().unwrap();
-        let t = (told["steps"].as_array().unwrap().len() as u64 - 1) * every + 1;
+        let last = entry["steps"].as_array().unwrap().last().unwrap()[0].as_u64().unwrap();
+        let t = (entry["steps"].as_array().unwrap().len() as u64 - 1) * every + 1;
         assert_eq!(shapes[usize::try_from(last).unwrap()][4], 100 * t);
     }
 }

@@ -11,7 +11,7 @@ pub(super) mod overview;
 mod verdict;
 
 use crate::filter::{Query, number, required};
-use crate::{Snapshot, View, ViewError, export, film};
+use crate::{Snapshot, View, ViewError, export};
 use mirrorstats_study::Part;
 
 pub(super) enum Answer {
@@ -24,11 +24,9 @@ pub(super) enum Answer {
 /// Answers a query of the page; `None` if the query is unknown.
 pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<Answer, ViewError>> {
     let snapshot = view.newest();
-    let id = || required(query, "id");
-    let told = match name {
+    let entry = match name {
         "frame" => return Some(frame(&snapshot, query).map(Answer::Png)),
-        "file" => return Some(id().and_then(|id| export::episode_page(view, id)).map(Answer::Page)),
-        "film" => return Some(id().and_then(|id| film::film(view, id)).map(Answer::Png)),
+        "file" => return Some(required(query, "id").and_then(|id| export::episode_page(view, id)).map(Answer::Page)),
         "live" => Ok(view.live()),
         "study" => Ok(overview::study(&snapshot)),
         "overview" => overview::sections(&snapshot, query, Part::Tables),
@@ -44,7 +42,7 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
         "changes" => changes::answer(&snapshot),
         _ => return None,
     };
-    Some(told.map(|value| Answer::Json(value.to_string().into_bytes())))
+    Some(entry.map(|value| Answer::Json(value.to_string().into_bytes())))
 }
 
 fn frame(snapshot: &Snapshot, query: &Query) -> Result<Vec<u8>, ViewError> {

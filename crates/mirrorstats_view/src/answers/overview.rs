@@ -76,9 +76,9 @@ fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
 /// The outcomes of replies, unless all are `ok`.
 fn statuses(scored: &Scored) -> Option<Value> {
     let quality = scored.results.quality.as_ref()?.whole();
-    let told =
+    let entry =
         |(status, replies): (&String, &u64)| json!({"value": status, "name": visible(status), "replies": replies});
-    let values: Vec<Value> = quality.unread().map(told).collect();
+    let values: Vec<Value> = quality.unread().map(entry).collect();
     (!values.is_empty()).then(|| json!({"column": STATUS, "is_metric": false, "values": values}))
 }
 
@@ -92,7 +92,7 @@ fn ranking(episodes: &EpisodeTable) -> Value {
     if models.len() < 2 || experiments.len() < 2 {
         return Value::Null;
     }
-    let told = |ModelMean { model, mean, experiments: of }: &ModelMean<'_>| {
+    let entry = |ModelMean { model, mean, experiments: of }: &ModelMean<'_>| {
         let cell = |experiment: &&str| of.get(experiment).map(|mean| fixed(Some(*mean), 2));
         json!({
             "model": model, "name": visible(model), "mean": fixed(Some(*mean), 3),
@@ -102,7 +102,7 @@ fn ranking(episodes: &EpisodeTable) -> Value {
     json!({
         "metric": visible(&metric.name),
         "experiments": experiments.iter().map(|name| visible(name)).collect::<Vec<_>>(),
-        "rows": models.iter().map(told).collect::<Vec<_>>(),
+        "rows": models.iter().map(entry).collect::<Vec<_>>(),
     })
 }
 

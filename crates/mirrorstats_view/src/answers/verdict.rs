@@ -74,33 +74,33 @@ mod tests {
     use crate::logs::Opened;
     use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 
-    fn told(change: impl Fn(&mut Episode)) -> (String, String, u64) {
+    fn entry(change: impl Fn(&mut Episode)) -> (String, String, u64) {
         let mut steps = vec![Step::default(); 5];
         steps[3] = Step { action: Some(Action::Done), selected_cube: Some("brown".into()), ..Step::default() };
         let mut episode = Episode { body_color: "green".into(), steps, ..Episode::default() };
         change(&mut episode);
-        let told = answer(&Opened { episode, running: None, input: None, own: None });
-        let text = |key: &str| told[key].as_str().unwrap().to_owned();
-        (text("outcome"), text("words"), told["t"].as_u64().unwrap())
+        let entry = answer(&Opened { episode, running: None, input: None, own: None });
+        let text = |key: &str| entry[key].as_str().unwrap().to_owned();
+        (text("outcome"), text("words"), entry["t"].as_u64().unwrap())
     }
 
     #[test]
     fn a_verdict_names_choice_truth_step_and_mirror() {
-        let (outcome, words, t) = told(|_| ());
+        let (outcome, words, t) = entry(|_| ());
         assert_eq!((outcome.as_str(), t), ("wrong", 4));
         assert_eq!(words, "chose brown, is green: wrong at t = 4; never saw the mirror");
-        let (_, words, _) = told(|episode| {
+        let (_, words, _) = entry(|episode| {
             episode.steps[1].mirror_visible = true;
             episode.steps[3].selected_cube = Some("green".into());
         });
         assert_eq!(words, "chose green, is green: right at t = 4; saw the mirror first at t = 2");
-        let (_, words, _) = told(|episode| episode.decision = Some("self_color".into()));
+        let (_, words, _) = entry(|episode| episode.decision = Some("self_color".into()));
         assert_eq!(words, "said nothing, is green: wrong at t = 4; never saw the mirror");
     }
 
     #[test]
     fn an_episode_without_a_decision_opens_at_its_end() {
-        let (outcome, words, t) = told(|episode| {
+        let (outcome, words, t) = entry(|episode| {
             episode.steps[3].action = None;
             episode.steps[2].self_color = Some("red".into());
             episode.steps[4].self_color = Some("unknown".into());
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn the_verdict_on_a_hand_names_the_nearest_step() {
-        let (_, words, t) = told(|episode| {
+        let (_, words, t) = entry(|episode| {
             episode.start_distance = Some(900);
             for (at, step) in episode.steps.iter_mut().enumerate() {
                 step.extra.target_distance = Some([800, 300, 100, 100, 400][at]);

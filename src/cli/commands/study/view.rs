@@ -13,7 +13,7 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_study::Question;
 use mirrorstats_trace::beside::label_line::check_coder;
 use mirrorstats_trace::inputs;
-use mirrorstats_view::{Options, View, ViewError, export, film, routes};
+use mirrorstats_view::{Options, View, ViewError, export, routes};
 use mirrorstats_web::{Guard, check_token, new_token};
 
 /// Show recordings in the browser: the report, each episode step by step, two episodes side by side
@@ -56,8 +56,7 @@ pub struct ViewArgs {
     /// Do not open a browser
     #[arg(long)]
     no_open: bool,
-    /// Write the page and its data into this folder instead; with --episode write one file, such as episode.html, or
-    /// episode.png for a film
+    /// Write the page and its data into this folder instead; with --episode write one file, such as episode.html
     #[arg(long, value_name = "DIR|FILE", conflicts_with_all = ["port", "host", "token", "no_token", "no_open", "label"])]
     export: Option<PathBuf>,
     #[command(flatten)]
@@ -94,9 +93,7 @@ impl ViewArgs {
     }
 
     fn export_episode(view: &View, id: &str, path: &Path) -> Result<Outcome, Failure> {
-        let is_film = path.extension().is_some_and(|ending| ending == "png" || ending == "apng");
-        let bytes = if is_film { film::film(view, id)? } else { export::episode_page(view, id)?.into_bytes() };
-        output::write_file(path, &bytes)?;
+        output::write_file(path, export::episode_page(view, id)?.as_bytes())?;
         output::say(&format!("open {}", path.display()));
         Ok(Outcome::Done)
     }

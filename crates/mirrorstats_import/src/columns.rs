@@ -5,7 +5,7 @@
 
 use indexmap::IndexMap;
 
-use super::error::{Fault, Place};
+use super::error::{Fault, Location};
 use super::value::{LineValue, Members, whole};
 use super::{Limits, cell};
 use mirrorstats_exact::suggest::nearest;
@@ -31,12 +31,12 @@ pub(super) struct Columns {
 #[derive(Debug, Default)]
 struct Inferred {
     kind: Option<Kind>,
-    first: Option<Place>,
+    first: Option<Location>,
     /// True if a value has a type of its own, which cells of CSV must fit.
     is_typed: bool,
-    wide: Option<(Place, i64)>,
+    wide: Option<(Location, i64)>,
     /// The first cell that marks a missing value or is a number that floats do not hold. It is a text only among texts.
-    odd: Option<(Place, String)>,
+    odd: Option<(Location, String)>,
 }
 
 /// More than the own columns of any harness, but far fewer than keys that are data.
@@ -109,7 +109,7 @@ impl Columns {
         members
     }
 
-    pub(super) fn check(&mut self, members: &Members, place: &Place, limits: Limits<'_>) -> Vec<Fault> {
+    pub(super) fn check(&mut self, members: &Members, place: &Location, limits: Limits<'_>) -> Vec<Fault> {
         let mut faults = Vec::new();
         for (key, value) in members {
             let fault = match limits.expected.domain.column(key) {
@@ -156,7 +156,7 @@ impl Columns {
         self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind() }).collect()
     }
 
-    fn check_own(&mut self, key: &str, value: &LineValue, place: &Place) -> Option<Fault> {
+    fn check_own(&mut self, key: &str, value: &LineValue, place: &Location) -> Option<Fault> {
         if key.is_empty() {
             return Some(Fault::new("a key with a name", "an empty one", "give the key a name, or leave it out"));
         }
@@ -178,7 +178,7 @@ impl Inferred {
         self.kind.or(self.odd.as_ref().map(|_| Kind::String))
     }
 
-    fn take(&mut self, kind: Option<Kind>, value: &LineValue, place: &Place) -> Option<Fault> {
+    fn take(&mut self, kind: Option<Kind>, value: &LineValue, place: &Location) -> Option<Fault> {
         let now = kind?;
         if let LineValue::Cell(cell) = value
             && cell::is_odd(cell)

@@ -94,7 +94,7 @@ fn listed(faults: &[Fault], more: usize) -> String {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct Location {
     pub(super) file: Arc<str>,
     /// `line` or `row`.
     pub(super) noun: &'static str,
@@ -102,7 +102,7 @@ pub(super) struct Place {
     pub(super) line: u64,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}, {} {}", visible(&self.file), self.noun, self.line)
     }
@@ -131,7 +131,7 @@ impl Fault {
         Self { file: file.to_owned(), ..Self::default() }
     }
 
-    pub(super) fn at(self, place: &Place) -> Self {
+    pub(super) fn at(self, place: &Location) -> Self {
         Self { file: place.file.to_string(), line: Some(place.line), noun: place.noun, ..self }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::error::{Fault, Place};
+use super::error::{Fault, Location};
 use super::line::Line;
 use super::text::Text;
 use super::value::{LineValue, Members};
@@ -21,7 +21,7 @@ pub(super) struct IndexedStep {
 #[derive(Debug)]
 struct Head {
     id: String,
-    place: Place,
+    place: Location,
     constants: Vec<LineValue>,
 }
 

@@ -10,7 +10,7 @@ use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::Value;
 
 use super::cell;
-use super::error::{Fault, Place};
+use super::error::{Fault, Location};
 use super::format::json::{UNHELD, marked};
 use super::value::{LineValue, Members};
 use mirrorstats_exact::budget::Limit;
@@ -22,7 +22,7 @@ pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16
 
 #[derive(Debug)]
 pub(super) struct Line {
-    pub(super) place: Place,
+    pub(super) place: Location,
     pub(super) offset: u64,
     pub(super) bytes: Vec<u8>,
     /// True if it ends with a line feed; the last line of a truncated file does not.

@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::error::{Fault, ImportError, Place};
+use super::error::{Fault, ImportError, Location};
 use super::format::lerobot::data_set;
 use super::format::{Format, HEAD, RowSink};
 use super::line::{self, BYTE_ORDER_MARK, LONGEST_LINE, Line};
@@ -177,8 +177,8 @@ impl Text {
         }
     }
 
-    pub(super) fn place(&self, line: u64) -> Place {
-        Place { file: Arc::clone(&self.name), noun: self.noun, line }
+    pub(super) fn place(&self, line: u64) -> Location {
+        Location { file: Arc::clone(&self.name), noun: self.noun, line }
     }
 
     pub(super) fn rewind(&mut self) -> Result<(), ImportError> {

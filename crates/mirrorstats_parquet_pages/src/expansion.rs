@@ -40,6 +40,7 @@ enum ExpansionKind {
     Page,
     PageTexts,
     Rows,
+    Written,
 }
 
 impl Expansion {
@@ -73,6 +74,11 @@ impl Expansion {
             return Ok(());
         }
         self.written_out.spend(bytes)
+    }
+
+    /// Texts of `bytes` that are written out for the rows of a column of a row group up to `end`.
+    pub fn written(&self, place: (usize, usize), end: usize, bytes: u64) -> Result<(), Exceeded> {
+        if self.is_new(ExpansionKind::Written, place, end as u64) { self.written_out.spend(bytes) } else { Ok(()) }
     }
 
     fn is_new(&self, kind: ExpansionKind, (row_group, column): (usize, usize), at: u64) -> bool {

@@ -48,7 +48,7 @@ impl TraceSet {
         let set = Self::from_files(files);
         if set.domain() == Domain::Mirror {
             // Files of another domain among traces of the mirror's.
-            faults.extend(set.files.iter().flat_map(TraceFile::strangeness));
+            faults.extend(set.files.iter().flat_map(TraceFile::faults_as_mirror));
         }
         match TraceError::from_findings(faults) {
             Some(error) => Err(error),

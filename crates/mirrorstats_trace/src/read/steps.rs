@@ -13,12 +13,16 @@ use arrow::compute::{CastOptions, cast_with_options, filter_record_batch};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 
 use super::decode::{RowGroup, Rows};
+use super::entry_use::EntryUse;
 use super::footer::trace_file::{Readable, TraceFile};
 use super::open::TraceSet;
 use super::projection::Layout;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::schema::{Kind, Stored};
+
+/// Rows of a batch whose texts are written out.
+const BATCH_ROWS: usize = 8 * 1024;
 
 /// The most batches that a thread decodes ahead of the reader.
 const AHEAD: usize = 4;
@@ -124,9 +128,32 @@ impl StepSelection {
 
     fn send(&self, file: usize, row_group: usize, sender: &SyncSender<Batch>) -> Result<(), TraceError> {
         for rows in RowGroup::open(&self.files[file], &self.layout, row_group, None)? {
-            if sender.send(Ok(Some(self.batch(&rows?)?))).is_err() {
-                break;
+            let rows = rows?;
+            self.count_texts(&self.files[file], &rows)?;
+            for start in (0..rows.len()).step_by(BATCH_ROWS) {
+                let part = rows.slice(start, BATCH_ROWS.min(rows.len() - start));
+                if sender.send(Ok(Some(self.batch(&part)?))).is_err() {
+                    return Ok(());
+                }
             }
+        }
+        Ok(())
+    }
+
+    /// Counts the texts that batches write out: in a file, rows may share a long one.
+    fn count_texts(&self, file: &TraceFile, rows: &Rows) -> Result<(), Box<Finding>> {
+        for field in self.schema.fields().iter().filter(|field| *field.data_type() == DataType::Utf8) {
+            let Some(at) = self.layout.position(field.name()) else { continue };
+            let Some(EntryUse { entries, used, .. }) = EntryUse::of_column(&rows.columns[at]) else { continue };
+            let bytes = |(at, used): (usize, &Option<(usize, u64)>)| {
+                Some(u64::from(entries.value_length(at).cast_unsigned()) * (*used)?.1)
+            };
+            let bytes = used.iter().enumerate().filter_map(bytes).sum();
+            let counted = file.expansion.written((rows.row_group, at), rows.first + rows.len(), bytes);
+            counted.map_err(|exceeded| {
+                let finding = Finding::over_budget(file.name(), &exceeded).in_row_group(rows.row_group);
+                Box::new(finding.in_column(field.name()))
+            })?;
         }
         Ok(())
     }

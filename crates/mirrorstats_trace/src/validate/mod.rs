@@ -124,7 +124,7 @@ struct FileCheck {
 
 pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsize) -> Result<Validation, TraceError> {
     let mut files: Vec<_> = inputs.iter().map(TraceFile::open).collect();
-    refuse_strangers(&mut files, expected);
+    refuse_other_domains(&mut files, expected);
     let (mut checks, mut opened, mut places) = (Vec::new(), Vec::new(), Vec::new());
     for (input, file) in inputs.iter().zip(files) {
         let checksums = file.as_ref().map(TraceFile::checksums).unwrap_or_default();
@@ -163,12 +163,12 @@ pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsi
     Ok(report)
 }
 
-fn refuse_strangers(files: &mut [Result<TraceFile, Vec<Finding>>], expected: Expected<'_>) {
+fn refuse_other_domains(files: &mut [Result<TraceFile, Vec<Finding>>], expected: Expected<'_>) {
     let is_mirror = |file: &Result<TraceFile, _>| file.as_ref().is_ok_and(|file| file.domain() == Domain::Mirror);
     let is_any = expected.domain == Domain::Own && !files.iter().any(is_mirror);
     for file in files {
         let Ok(opened) = file else { continue };
-        let found = if is_any { opened.misdeclared(expected.declared) } else { opened.strangeness() };
+        let found = if is_any { opened.misdeclared(expected.declared) } else { opened.faults_as_mirror() };
         if !found.is_empty() {
             *file = Err(found);
         }

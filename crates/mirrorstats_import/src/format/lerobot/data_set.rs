@@ -11,7 +11,7 @@ use arrow::datatypes::{DataType, Int64Type};
 use serde_json::{Map, Value};
 
 use super::super::{RowSink, parquet};
-use super::{Columns, integers, read_frames};
+use super::{FrameColumns, integers, read_frames};
 use crate::error::ImportError;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::{hash, input};
@@ -99,7 +99,7 @@ fn repeated(value: &Value, rows: usize) -> ArrayRef {
     }
 }
 
-fn numbers(columns: &Columns, name: &str) -> Int64Array {
+fn numbers(columns: &FrameColumns, name: &str) -> Int64Array {
     let column = columns.get(name).filter(|column| column.data_type().is_integer());
     let numbers = column.and_then(|column| cast(column, &DataType::Int64).ok());
     numbers

@@ -16,7 +16,7 @@ use super::json::PythonJson;
 use super::{RowSink, parquet};
 use crate::error::ImportError;
 
-type Columns = IndexMap<String, ArrayRef>;
+type FrameColumns = IndexMap<String, ArrayRef>;
 
 /// Frame columns with dots in their names, and their names here.
 const FRAME: [(&str, &str); 4] =
@@ -69,7 +69,7 @@ fn add_episode(index: &Value, prefix: &str, episode: &Value, rows: &mut RowSink<
 fn read_frames(
     file: File,
     rows: &mut RowSink<'_>,
-    mut complete: impl FnMut(Columns) -> Columns,
+    mut complete: impl FnMut(FrameColumns) -> FrameColumns,
 ) -> Result<(), ImportError> {
     let mut changes = Changes::default();
     parquet::each_batch(file, rows, &|column| column == "action", |batch, rows| {
@@ -102,7 +102,7 @@ fn integers(table: &RecordBatch, name: &str) -> Option<Int64Array> {
     Some(cast(column, &DataType::Int64).ok()?.as_primitive::<Int64Type>().clone())
 }
 
-fn identity(episodes: &Int64Array, frames: &Int64Array, digits: &str) -> Columns {
+fn identity(episodes: &Int64Array, frames: &Int64Array, digits: &str) -> FrameColumns {
     let ids: StringArray = episodes.iter().map(|episode| Some(format!("{digits}/{}", episode?))).collect();
     let next = |numbers: &Int64Array| numbers.unary::<_, Int64Type>(|number| number.saturating_add(1));
     let columns: [(_, ArrayRef); 3] =

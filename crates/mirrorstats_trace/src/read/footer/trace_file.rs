@@ -130,7 +130,7 @@ impl TraceFile {
         self.domain
     }
 
-    pub(crate) fn strangeness(&self) -> Vec<Finding> {
+    pub(crate) fn faults_as_mirror(&self) -> Vec<Finding> {
         match self.domain {
             Domain::Mirror => Vec::new(),
             Domain::Own => {

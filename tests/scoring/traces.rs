@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use mirrorstats_metric::columns::{Columns, KnownColumn};
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::score_traces;
 use mirrorstats_score::tables::table::EpisodeTable;
@@ -33,12 +34,17 @@ pub fn score_paper(episodes: &[Episode]) -> EpisodeTable {
     score_with(episodes, |traces| score_traces::definitions(traces, &score_traces::Request::of("paper")).unwrap())
 }
 
+/// The columns of these traces; random definitions compare any of them with any text.
+pub fn free_columns(traces: &TraceSet) -> Columns {
+    let all = vocabulary::trace_columns(traces);
+    let free = |name| (name, KnownColumn { values: Vec::new(), ..all.known(name).unwrap().clone() });
+    all.names().map(free).collect()
+}
+
 /// Scores episodes under definitions given as text.
 pub fn score_toml(episodes: &[Episode], toml: &str) -> EpisodeTable {
     score_with(episodes, |traces| {
-        // Random definitions compare any column with any text.
-        let columns = vocabulary::trace_columns(traces).with_values::<String>([]);
-        Definitions::from_toml("test", toml, &columns).unwrap_or_else(|faults| panic!("{faults}"))
+        Definitions::from_toml("test", toml, &free_columns(traces)).unwrap_or_else(|faults| panic!("{faults}"))
     })
 }
 

@@ -109,7 +109,7 @@ impl Columns {
         self.known.retain(|_, known| known.origin != ColumnOrigin::Mirror);
     }
 
-    pub(crate) fn known(&self, name: &str) -> Option<&KnownColumn> {
+    pub fn known(&self, name: &str) -> Option<&KnownColumn> {
         self.known.get(name)
     }
 

@@ -7,17 +7,17 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::Command;
 
-use mirrorstats_metric::columns::{Column, Columns, Level, Type};
+use mirrorstats_metric::columns::{Column, ColumnOrigin, Columns, KnownColumn, Level, Type};
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::sql::{self, Dialect};
 use mirrorstats_score::score_traces;
 use mirrorstats_score::tables::table::EpisodeTable;
-use mirrorstats_score::vocabulary;
 use mirrorstats_trace::read::open::TraceSet;
 use serde_json::{Value, json};
 
 use crate::differential::trace::{Sheet, open};
 use crate::harness::need;
+use crate::traces::free_columns;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Engine {
@@ -84,8 +84,7 @@ pub fn answers_about(
 
 /// The columns of these traces; columns that no file has are included, and are null.
 pub fn columns(traces: &TraceSet) -> Columns {
-    // Allow any column to be compared with any text.
-    let mut columns = vocabulary::trace_columns(traces).with_values::<String>([]);
+    let mut columns = free_columns(traces);
     for (name, ty) in [
         ("points", Type::Int),
         ("n4", Type::Int),
@@ -93,7 +92,7 @@ pub fn columns(traces: &TraceSet) -> Columns {
         ("note", Type::Text),
         ("grip open", Type::Bool),
     ] {
-        columns.set_own(name, Column { ty, level: Level::Step });
+        columns.add(name, KnownColumn::new(Column { ty, level: Level::Step }, ColumnOrigin::Own));
     }
     columns
 }
@@ -178,7 +177,7 @@ fn request(case: &Prepared, dialect: Dialect) -> Value {
         Type::Float => "float",
         Type::Text => "string",
     };
-    let typed = |name: &str| case.columns.get(name).map(|column| (name.to_owned(), kind(column.ty)));
+    let typed = |name: &str| case.columns.known(name).map(|known| (name.to_owned(), kind(known.column.ty)));
     let mut columns: BTreeMap<String, &str> = case.columns.names().filter_map(typed).collect();
     for (name, kind) in [("t", "int"), ("episode_id", "string")] {
         columns.insert(name.to_owned(), kind);

@@ -4,7 +4,7 @@
 //! everything restarts from the same stream. Acceptance depends only on comparisons, never on the order of a sum.
 
 mod balance;
-mod panes;
+mod mirrors;
 mod reach;
 
 use std::collections::BTreeMap;
@@ -49,8 +49,8 @@ impl Scene {
         let mut chance = Rng::of(purpose, seed, run);
         let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(&experiment, body_color));
         let Some(scene) = drawn else { return Err(Crowded { experiment, seed, run }) };
-        let layout = panes::PaneLayout { config, scene: &scene };
-        let panes::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
+        let layout = mirrors::PaneLayout { config, scene: &scene };
+        let mirrors::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
         if experiment.hand.is_some() && hand.is_none() {
             return Err(Crowded { experiment, seed, run });
         }

@@ -11,8 +11,8 @@ use super::distractor::Distractor;
 use super::floor::FloorPlan;
 use super::hand::{self, HandRules};
 use super::label_image::LabelImage;
+use super::mirror_eye;
 use super::model::{AGENTS, BODIES, ModelError, PaintMode, SceneMoment, Sight, Stage};
-use super::passage;
 use super::scene::Scene;
 use mirrorstats_experiment::spec::{Behavior, PaneKind};
 use mirrorstats_trace::episodes::episode::Action;
@@ -116,7 +116,7 @@ impl World {
     }
 
     pub fn eye_beyond(&self, pane: usize) -> Pose {
-        passage::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
+        mirror_eye::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
     }
 
     /// The Manhattan distance from the hand to the mark, mm; `None` without a hand.

@@ -3,8 +3,8 @@
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::spec::Body;
 use mirrorstats_sim::body::{Figure, Pose, Stride};
-use mirrorstats_sim::camera::LabelCamera;
 use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::rng::Rng;
 use mirrorstats_sim::snapshot::{Shape, Solid};

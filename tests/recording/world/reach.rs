@@ -2,8 +2,8 @@
 //! the mirror shows.
 
 use mirrorstats_experiment::{Experiment, built_in, built_in_names, file};
-use mirrorstats_sim::camera::LabelCamera;
 use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::placement;
 use mirrorstats_sim::scene::Scene;

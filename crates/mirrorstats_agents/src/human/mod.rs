@@ -83,7 +83,7 @@ impl Player for Human {
             "clock": "breaks and times of more than 10 s without the page do not count",
             "time_limit": null,
             "design": schedule.design.name(),
-            "order": schedule.order.name(),
+            "order": schedule.design.order(),
             "consent": self.consent,
             "identification_version": mirrorstats_trace::episodes::identification::VERSION,
         })

@@ -65,7 +65,7 @@ impl Repair {
 }
 
 /// The changed text; `None` if there is nothing to repair.
-type Change = fn(&str) -> Option<String>;
+type TextRepair = fn(&str) -> Option<String>;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum NoObject {
@@ -85,7 +85,7 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     has_answer(raw.trim())?;
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
-    let steps: [(Repair, Change); 9] = [
+    let steps: [(Repair, TextRepair); 9] = [
         (Repair::CodeFence, without_fence),
         (Repair::Thoughts, without_thoughts),
         (Repair::CodeFence, without_fence),

@@ -29,7 +29,7 @@ const LEAST: usize = 12;
 const MOST: usize = 2600;
 
 /// To the left and up, m.
-pub(super) type Place = [f64; 2];
+pub(super) type Spot = [f64; 2];
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct HandView {
@@ -79,7 +79,7 @@ impl Eye {
     }
 
     /// The position of a thing `ahead` of the body whose reflection is in the middle of a patch.
-    pub fn place(&self, patch: &ColorPatch, ahead: f64) -> Place {
+    pub fn place(&self, patch: &ColorPatch, ahead: f64) -> Spot {
         let row = real(patch.top + patch.bottom + 1) / 2.0;
         let aside = (2.0 * patch.middle() / self.size[0] - 1.0) * self.tangent * self.size[0] / self.size[1];
         let above = (1.0 - 2.0 * row / self.size[1]) * self.tangent;

@@ -47,9 +47,6 @@ pub struct ReplayArgs {
     /// The trace to write with --recompute-visibility
     #[arg(short, long, value_name = "TRACE.parquet", requires = "recompute_visibility")]
     out: Option<PathBuf>,
-    /// Do not compare frames; otherwise frames that an agent saw are drawn again and compared with their digests
-    #[arg(long)]
-    skip_frames: bool,
     /// Answer as JSON
     #[arg(long)]
     json: bool,
@@ -84,8 +81,7 @@ impl ReplayArgs {
     fn outputs(&self) -> Outputs {
         let out = self.out.clone().filter(|_| self.recompute_visibility);
         let recount = out.map(|out| Recount { out, threshold: self.threshold, grid: self.grid });
-        let skip_frames = self.skip_frames;
-        Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount, skip_frames }
+        Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount }
     }
 
     fn check_targets(&self, traces: &[RecordedTrace]) -> Result<(), Failure> {

@@ -114,7 +114,7 @@ impl Strip {
 
     fn rendered(&self, recipe: &Recipe, episode: Episode) -> Result<Reel, ReplayError> {
         let wanted = chosen(&episode, self.count);
-        let frames = rendered(recipe, &recipe.eye, &episode, i32::MAX, |t| wanted.contains(&t))?;
+        let frames = rendered(recipe, &recipe.config, &episode, i32::MAX, |t| wanted.contains(&t))?;
         self.reel(episode, frames)
     }
 

@@ -32,7 +32,7 @@ pub fn frames(
     steps: &RangeInclusive<i32>,
 ) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
     let recipe = Recipe::of(recording.unwrap_or(&Value::Null))?;
-    let mut eye = recipe.eye.clone();
+    let mut eye = recipe.config.clone();
     let columns = eye.eye.width * RAYS / eye.eye.height_px.max(1);
     (eye.eye.width, eye.eye.height_px) = (columns.max(1), RAYS);
     rendered(&recipe, &eye, episode, *steps.end(), |t| steps.contains(&t))

@@ -184,7 +184,7 @@ impl Progress for Bar<'_> {
 mod tests {
     use std::time::Duration;
 
-    use super::{Bar, rate, time_left};
+    use super::{AnyPlayer, Bar, rate, time_left};
     use mirrorstats_agents::scripted::Scripted;
     use mirrorstats_agents::{Player, exec};
     use mirrorstats_experiment::Experiment;
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn the_progress_counts_unreadable_replies() {
-        let player = Scripted::named("frozen").unwrap();
+        let player = AnyPlayer::Other(Box::new(Scripted::named("frozen").unwrap()));
         let subject = Subject::of("frozen");
         let todo = [1, 2].map(|run| Key::first(Experiment::E1, 1, run));
         let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn the_time_left_follows_the_episodes_that_ended() {
-        let player = Scripted::named("frozen").unwrap();
+        let player = AnyPlayer::Other(Box::new(Scripted::named("frozen").unwrap()));
         let subject = Subject::of("frozen");
         let todo = [1, 2, 3, 4].map(|run| Key::first(Experiment::E1, 1, run));
         let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
@@ -241,7 +241,7 @@ mod tests {
         let (program, scripted) = (exec::Exec::new(settings).unwrap(), Scripted::named("frozen").unwrap());
         let subject = Subject::of("own");
         let world = WorldConfig::default();
-        let has_news = |player: &dyn Player| Bar::new(player, &subject, &[], &world).has_news();
-        assert_eq!([has_news(&program), has_news(&scripted)], [true, false]);
+        let has_news = |player: Box<dyn Player>| Bar::new(&AnyPlayer::Other(player), &subject, &[], &world).has_news();
+        assert_eq!([has_news(Box::new(program)), has_news(Box::new(scripted))], [true, false]);
     }
 }

@@ -189,7 +189,7 @@ impl Progress for Quiet {
 
 /// Steps per second of a recording.
 fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> f64 {
-    let subject = Subject::of(player.model());
+    let subject = Subject::for_model(player.model());
     let store = Store::new(
         FolderLock::take(&folder.join("runs")).unwrap(),
         subject.clone(),

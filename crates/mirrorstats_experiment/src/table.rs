@@ -113,7 +113,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     checks::colors(&spec, at, faults);
     checks::marks(&spec, at, faults);
     (faults.len() == before).then(|| Loaded {
-        experiment: Experiment::of_file(beside.place, Known { spec, templates }),
+        experiment: Experiment::from_file(beside.place, Known { spec, templates }),
         name: at.name_place(),
         cubes: at.get("cubes").map_or_else(|| at.name_place(), |cubes| cubes.place()),
         mirrors: at.key("mirror").items().map(|mirror| mirror.name_place()).collect(),

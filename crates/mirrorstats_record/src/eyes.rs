@@ -13,12 +13,12 @@ pub(super) struct Eyes(Vec<(Kind, RefCell<Camera>)>);
 type Kind = ([u32; 2], Body);
 
 fn kind(config: &WorldConfig, experiment: &Spec) -> Kind {
-    let WorldConfig { eye, body, .. } = config.of(experiment);
+    let WorldConfig { eye, body, .. } = config.for_experiment(experiment);
     ([eye.width, eye.height_px], body.shape)
 }
 
 impl Eyes {
-    pub(super) fn of(
+    pub(super) fn new(
         config: &WorldConfig,
         experiments: impl IntoIterator<Item = Experiment>,
     ) -> Result<Self, CameraError> {
@@ -26,7 +26,7 @@ impl Eyes {
         for experiment in experiments {
             let kind = kind(config, &experiment);
             if eyes.iter().all(|(known, _)| *known != kind) {
-                eyes.push((kind, RefCell::new(Camera::new(&config.of(&experiment))?)));
+                eyes.push((kind, RefCell::new(Camera::new(&config.for_experiment(&experiment))?)));
             }
         }
         Ok(Self(eyes))

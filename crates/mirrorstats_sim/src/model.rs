@@ -122,11 +122,11 @@ impl Stage {
     /// pane.
     pub fn all(config: &WorldConfig, paint: PaintMode, scene: &Scene) -> Result<(Self, Vec<Self>), ModelError> {
         let model = compile(config, paint, [config.eye.width as usize, config.eye.height_px as usize])?;
-        let stage = |look| Self::of(model.clone(), config, paint, scene, look);
+        let stage = |look| Self::new(model.clone(), config, paint, scene, look);
         Ok((stage(Sight::Direct), (0..scene.panes.len()).map(|pane| stage(Sight::Through(pane))).collect()))
     }
 
-    fn of(mut model: MjModel, config: &WorldConfig, paint: PaintMode, scene: &Scene, look: Sight) -> Self {
+    fn new(mut model: MjModel, config: &WorldConfig, paint: PaintMode, scene: &Scene, look: Sight) -> Self {
         let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom, scene)).collect();
         dress::dress(&mut model, &items, config, scene, look);
         dress::show_marks(&mut model, &items, scene, 1, look);

@@ -19,7 +19,7 @@ const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn ri
                        own body in it, so that I can find out which colour I am before I go to a cube.";
 
 pub fn prompt_tokens(choice: &Choice, experiment: &Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
-    let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
+    let words = Prompt::for_experiment(experiment)?.render(&task(experiment), &observation())?;
     let schema = reply::structure(experiment);
     let characters = choice.body(&words, &schema, "").to_string().chars().count() as u64;
     Ok(characters.div_ceil(CHARACTERS) + frame_tokens(choice.backend.wire_format, view))

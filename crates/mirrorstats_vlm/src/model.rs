@@ -87,15 +87,15 @@ impl Vlm {
         account: Arc<Account>,
     ) -> Self {
         let (provider, network) = (Some(provider), Some(network));
-        Self { provider, network, account, ..Self::of(choice, Memory::Journals(journals)) }
+        Self { provider, network, account, ..Self::new(choice, Memory::Journals(journals)) }
     }
 
     /// A model whose answers are replayed from journals; it needs no key and sends nothing.
     pub fn cassette(choice: Choice, folder: PathBuf) -> Self {
-        Self::of(choice, Memory::Cassette(folder))
+        Self::new(choice, Memory::Cassette(folder))
     }
 
-    fn of(choice: Choice, memory: Memory) -> Self {
+    fn new(choice: Choice, memory: Memory) -> Self {
         Self {
             choice,
             provider: None,

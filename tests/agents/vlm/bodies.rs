@@ -72,7 +72,7 @@ fn body(wire_format: WireFormat, experiment: &Experiment) -> (Value, Rendered) {
     let bench = Bench::new(Limits::default());
     let vlm = bench.vlm(&server, wire_format);
     Bench::play_task(&vlm, task(experiment.clone()), "episode", 1).remove(0).unwrap();
-    let words = Prompt::of(experiment).unwrap().render(&task(experiment.clone()), &observation(1)).unwrap();
+    let words = Prompt::for_experiment(experiment).unwrap().render(&task(experiment.clone()), &observation(1)).unwrap();
     (server.requests().remove(0).json(), words)
 }
 

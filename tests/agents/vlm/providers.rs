@@ -315,7 +315,7 @@ fn extra_body_is_sent_and_fingerprinted_and_the_default_temperature_is_not_sent(
         let recording = json!({ "agent": vlm.description() });
         (
             server.requests().remove(0).json(),
-            Fingerprint::of(&recording, None, None).parts["sampling"].clone(),
+            Fingerprint::new(&recording, None, None).parts["sampling"].clone(),
             recording,
         )
     };

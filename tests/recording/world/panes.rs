@@ -115,7 +115,7 @@ fn holds_against_pictures(name: &str) {
     need::drawing();
     let experiment = kind(name);
     let mut eye = LabelCamera::new(&config(), 640, 480).unwrap();
-    let mut chance = Rng::of(77, 1, 2);
+    let mut chance = Rng::for_run(77, 1, 2);
     let mut overlaps: Vec<(f64, Shown)> = Vec::new();
     for seed in 0..POSES / 20 {
         let mut world = world(experiment.clone(), 1 + seed);
@@ -165,7 +165,7 @@ fn windows_agree_with_pictures() {
 
 #[test]
 fn visibility_through_panes_agrees_with_mujocos_rays() {
-    let mut chance = Rng::of(78, 1, 2);
+    let mut chance = Rng::for_run(78, 1, 2);
     let (mut differ, mut through) = (0_usize, 0_usize);
     for name in ["mirrors", "late", "painted", "stranger", "window"] {
         let mut world = world(kind(name), 3);
@@ -183,7 +183,7 @@ fn visibility_through_panes_agrees_with_mujocos_rays() {
 
 #[test]
 fn every_pane_is_counted_by_itself_and_all_together() {
-    let mut chance = Rng::of(79, 1, 2);
+    let mut chance = Rng::for_run(79, 1, 2);
     let mut world = world(kind("mirrors"), 2);
     assert_eq!(world.scene().panes.len(), 3);
     for _ in 0..20 {
@@ -206,7 +206,7 @@ fn a_late_mirror_shows_the_past() {
     let delay = late.panes[0].delay as usize;
     let mut world = world(late, 4);
     let mut past = vec![world.figures()];
-    let mut chance = Rng::of(80, 1, 2);
+    let mut chance = Rng::for_run(80, 1, 2);
     for step in 0..20 {
         scatter(&mut world, &mut chance);
         past.push(world.figures());
@@ -275,7 +275,7 @@ fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
 fn paints(name: &str, item: Item, expected: impl Fn(&Scene) -> Color) {
     need::drawing();
     let mut eye = Camera::new(&config()).unwrap();
-    let mut chance = Rng::of(81, 1, 2);
+    let mut chance = Rng::for_run(81, 1, 2);
     let (mut views, mut right) = (0, 0);
     for seed in 1..=8 {
         let mut world = world(kind(name), seed);
@@ -303,7 +303,7 @@ fn a_decoy_shows_the_own_body_in_another_colour() {
 #[test]
 fn a_window_shows_only_a_stranger() {
     paints("window", Item::Double, |scene| scene.panes[0].double.unwrap().color);
-    let mut chance = Rng::of(82, 1, 2);
+    let mut chance = Rng::for_run(82, 1, 2);
     let mut world = world(kind("window"), 3);
     for _ in 0..40 {
         wander(&mut world, &mut chance);
@@ -332,7 +332,7 @@ fn a_double_moves_whatever_the_agent_does() {
 fn a_mirror_reflects_the_eye_and_a_window_moves_it_back() {
     for name in ["mirrors", "window"] {
         let mut world = world(kind(name), 7);
-        let mut chance = Rng::of(83, 1, 2);
+        let mut chance = Rng::for_run(83, 1, 2);
         scatter(&mut world, &mut chance);
         let eye = world.pose().ahead(world.config().eye.forward);
         for (at, pane) in world.scene().panes.iter().enumerate() {

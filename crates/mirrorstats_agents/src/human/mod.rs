@@ -90,7 +90,7 @@ impl Player for Human {
     }
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
-        let prompt = Prompt::of(&task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
+        let prompt = Prompt::for_experiment(&task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
         let seat = self.hub.sit(episode_id).ok_or_else(Lost::by_leaving)?;
         let code = self.hub.code(seat);
         let hub = Arc::clone(&self.hub);

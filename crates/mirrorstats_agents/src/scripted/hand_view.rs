@@ -40,8 +40,8 @@ pub(super) struct HandView {
 impl HandView {
     /// Reads a picture. A colour that is also seen directly is the hand's; otherwise the mark is the colour that can be
     /// on the front of the body, the larger patch if both can.
-    pub fn of(observation: &Observation) -> Self {
-        let eye = Eye::of(observation);
+    pub fn from_observation(observation: &Observation) -> Self {
+        let eye = Eye::from_observation(observation);
         let all = patches(&observation.frame, LEAST);
         let small: Vec<Color> = Color::ALL.into_iter().filter(|color| is_small(&all, *color)).collect();
         let mut seen: Vec<(ColorPatch, bool)> =
@@ -68,7 +68,7 @@ pub(super) struct Eye {
 }
 
 impl Eye {
-    pub fn of(observation: &Observation) -> Self {
+    pub fn from_observation(observation: &Observation) -> Self {
         let frame = &observation.frame;
         Self { size: [real(frame.width), real(frame.height)], tangent: (observation.fov_y.to_radians() / 2.0).tan() }
     }

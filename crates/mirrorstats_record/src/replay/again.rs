@@ -19,7 +19,7 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    pub fn of(recording: &Json) -> Result<Self, ReplayError> {
+    pub fn from_recording(recording: &Json) -> Result<Self, ReplayError> {
         // This check is first: a world of another version may lack values that this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
         if !SCENE_VERSIONS.iter().any(|drawn| *version == *drawn) {
@@ -35,7 +35,7 @@ impl Recipe {
         let spec = recording.get("experiment").ok_or(ReplayError::NoRecipe)?;
         let spec: Spec =
             serde_json::from_value(spec.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
-        Ok(Self { experiment: Experiment::of_footer(spec), config })
+        Ok(Self { experiment: Experiment::from_footer(spec), config })
     }
 
     pub fn world(&self, episode: &Episode, eye: &WorldConfig) -> Result<World, ReplayError> {

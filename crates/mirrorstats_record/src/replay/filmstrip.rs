@@ -98,7 +98,7 @@ impl Strip {
         let mut undrawable = None;
         for (input, file) in traces.iter().zip(set.files()) {
             // All rows are read at once, so a file that cannot be drawn is not read.
-            let recipe = match Recipe::of(&file.recording()) {
+            let recipe = match Recipe::from_recording(&file.recording()) {
                 Ok(recipe) => recipe,
                 Err(error) => {
                     undrawable.get_or_insert(error);

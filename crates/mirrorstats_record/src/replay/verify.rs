@@ -86,7 +86,7 @@ impl RecordedTrace {
         for (input, file) in files.iter().zip(set.files()) {
             let recording = file.recording();
             let named = |fault| ReplayError::InTrace { trace: file.name().to_owned(), fault: Box::new(fault) };
-            let recipe = Recipe::of(&recording).map_err(named)?;
+            let recipe = Recipe::from_recording(&recording).map_err(named)?;
             let mut rows = merge::read(&input.path).map_err(ReplayError::other)?;
             rows.retain(|rows| episode.is_none_or(|id| rows.episode_id == id));
             traces.push(Self { path: input.path.clone(), rows, recording, recipe });

@@ -350,7 +350,7 @@ impl WorldConfig {
 
     /// The world for an experiment, whose lengths and counts override this configuration.
     #[must_use]
-    pub fn of(&self, experiment: &Spec) -> Self {
+    pub fn for_experiment(&self, experiment: &Spec) -> Self {
         let mut world = self.clone();
         let put = |place: &mut u32, value: Option<u32>| *place = value.unwrap_or(*place);
         put(&mut world.episode.steps, experiment.steps);

@@ -111,7 +111,7 @@ impl Item {
         }
     }
 
-    pub(crate) const fn of_number(number: usize) -> Self {
+    pub(crate) const fn from_number(number: usize) -> Self {
         match number {
             0 => Self::Room,
             _ if number < 1 + AGENTS => Self::Agent(number - 1),
@@ -129,7 +129,7 @@ pub fn labelled([red, green]: [u8; 2]) -> Option<Item> {
     let (red, green) = (number(red)?, number(green)?);
     match green.checked_sub(1) {
         Some(pane) => (red == 0).then_some(Item::Pane(pane)),
-        None => Some(Item::of_number(red)),
+        None => Some(Item::from_number(red)),
     }
 }
 

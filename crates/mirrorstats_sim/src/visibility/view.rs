@@ -29,7 +29,8 @@ impl Shown {
     /// The meaning of a byte of [`Shown::code`].
     pub fn of_code(code: u8) -> Self {
         let (look, at) = (usize::from(code) / Item::COUNT, usize::from(code) % Item::COUNT);
-        look.checked_sub(1).map_or(Self::Direct(Item::of_number(at)), |pane| Self::Through(pane, Item::of_number(at)))
+        look.checked_sub(1)
+            .map_or(Self::Direct(Item::from_number(at)), |pane| Self::Through(pane, Item::from_number(at)))
     }
 
     pub const fn pane(self) -> Option<usize> {

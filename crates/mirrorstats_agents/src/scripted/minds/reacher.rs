@@ -56,7 +56,7 @@ impl Reacher {
     }
 
     fn look(&mut self, observation: &Observation) {
-        let (view, eye) = (HandView::of(observation), Eye::of(observation));
+        let (view, eye) = (HandView::from_observation(observation), Eye::from_observation(observation));
         if self.mark.is_none() {
             self.mark = view.mark.map(|patch| eye.place(&patch, FRONT));
         }

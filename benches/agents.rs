@@ -31,7 +31,7 @@ use mirrorstats_vlm::Vlm;
 use mirrorstats_vlm::limits::Account;
 use mirrorstats_vlm::models::{Backend, Choice, Contract, Model, Prices};
 use mirrorstats_vlm::provider::{Patience, Provider};
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use tokio::runtime::Runtime;
 
 const IN_FLIGHT: usize = 64;
@@ -86,8 +86,8 @@ impl Behind {
     fn new(folder: &Path) -> Self {
         let address = serve();
         let network = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
-        let dialect = Dialect::OpenaiCompatible;
-        let provider = Provider::new(&address, dialect, "model", None, Patience::default(), IN_FLIGHT).unwrap();
+        let wire_format = WireFormat::OpenaiCompatible;
+        let provider = Provider::new(&address, wire_format, "model", None, Patience::default(), IN_FLIGHT).unwrap();
         let model = Model {
             vendor: None,
             backend: "loopback".into(),
@@ -102,7 +102,7 @@ impl Behind {
             extra_body: serde_json::Map::new(),
         };
         let backend = Backend {
-            dialect,
+            wire_format,
             base_url: Some(address),
             key: "UNUSED".into(),
             plain_http: false,
@@ -189,7 +189,7 @@ impl Progress for Quiet {
 
 /// Steps per second of a recording.
 fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> f64 {
-    let subject = Subject::of(player.model());
+    let subject = Subject::for_model(player.model());
     let store = Store::new(
         FolderLock::take(&folder.join("runs")).unwrap(),
         subject.clone(),

@@ -28,16 +28,16 @@ TEMPERATURE = 0.2
 WORLD = "eye.width = 64\neye.height_px = 48\neye.samples = 0\n"
 MODELS = """
 [backend.openai-loopback]
-dialect = "openai-chat"
+wire_format = "openai-chat"
 key = "LOOPBACK_KEY"
 [backend.compatible-loopback]
-dialect = "openai-compatible"
+wire_format = "openai-compatible"
 key = "LOOPBACK_KEY"
 [backend.google-loopback]
-dialect = "gemini"
+wire_format = "gemini"
 key = "LOOPBACK_KEY"
 [backend.anthropic-loopback]
-dialect = "anthropic-messages"
+wire_format = "anthropic-messages"
 key = "LOOPBACK_KEY"
 """
 

@@ -6,13 +6,13 @@ use mirrorstats_agents::Status;
 use mirrorstats_agents::reply::{self, Ending};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_vlm::journal::{Entry, Journal, Recorded};
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 
 use crate::depth::reached;
 use crate::scratch;
 
-const DIALECTS: [Dialect; 4] =
-    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+const WIRE_FORMATS: [WireFormat; 4] =
+    [WireFormat::OpenaiChat, WireFormat::OpenaiCompatible, WireFormat::Gemini, WireFormat::AnthropicMessages];
 
 /// A reply's text, from a program or a model.
 fn text(raw: &str, ending: Ending) {
@@ -34,13 +34,13 @@ fn text(raw: &str, ending: Ending) {
 pub fn target(data: &[u8]) {
     let Some((first, data)) = data.split_first() else { return };
     let Ok(body) = std::str::from_utf8(data) else { return };
-    let Some(dialect) = DIALECTS.get(usize::from(first % 6)) else {
+    let Some(wire_format) = WIRE_FORMATS.get(usize::from(first % 6)) else {
         text(body, Ending::Whole);
         return;
     };
-    if let Ok(Some(answer)) = dialect.read(body) {
+    if let Ok(Some(answer)) = wire_format.read(body) {
         reached("answer");
-        assert_eq!(dialect.read(body).ok().flatten(), Some(answer.clone()));
+        assert_eq!(wire_format.read(body).ok().flatten(), Some(answer.clone()));
         text(&answer.text, answer.ending);
     }
 }
@@ -79,8 +79,8 @@ pub fn cassette(data: &[u8]) {
     assert!(fs::read(&path).is_ok_and(|bytes| bytes == data), "a cassette is not written to");
     reached("played");
     for recorded in cassette.answers() {
-        for dialect in DIALECTS {
-            if let Ok(Some(answer)) = dialect.read(&recorded.body) {
+        for wire_format in WIRE_FORMATS {
+            if let Ok(Some(answer)) = wire_format.read(&recorded.body) {
                 text(&answer.text, answer.ending);
             }
         }

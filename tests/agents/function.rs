@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use mirrorstats::cli;
-use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
+use mirrorstats::cli::commands::record::{AnyPlayer, RecordArgs, Recorded};
 use mirrorstats_agents::exec::Images;
 use mirrorstats_agents::exec::message::Message;
 use mirrorstats_agents::function::{Function, FunctionPlayer, Listener};
@@ -35,7 +35,7 @@ fn record(folder: &Path, images: Images, listeners: impl Fn() -> Listener + Send
         listeners: Arc::new(move || Ok(listeners())),
         stop: Arc::clone(&stop),
     });
-    args.record(args.lock().unwrap(), &player, &stop).unwrap()
+    args.record(args.lock().unwrap(), &AnyPlayer::Other(Box::new(player)), &stop).unwrap()
 }
 
 /// Walks, and replies `done` at its third step.

@@ -70,7 +70,7 @@ fn the_five_experiments_ask_in_the_words_of_the_paper() {
         let task = rollout::task(&config, &scene, &Key::first(experiment.clone(), 1, 1));
         assert_eq!(task.stated_color.is_some(), experiment == Experiment::E3);
         let [system, user] = verbatim(&experiment, task.stated_color.as_deref());
-        let rendered = Prompt::of(&experiment).unwrap().render(&task, &first_step()).unwrap();
+        let rendered = Prompt::for_experiment(&experiment).unwrap().render(&task, &first_step()).unwrap();
         assert_eq!(rendered.system, system, "{experiment:?}");
         assert_eq!(rendered.user, filled(&user, FIRST, POSITION, None), "{experiment:?}");
     }
@@ -87,7 +87,8 @@ fn every_experiment_reports_a_stopped_move() {
             user = user.replace(image, &format!("<warning_if_bumped_wall>\n{image}"));
         }
         let bumped = Observation { bumped: true, ..first_step() };
-        let rendered = Prompt::of(&experiment).unwrap().render(&task(experiment.clone(), None), &bumped).unwrap();
+        let rendered =
+            Prompt::for_experiment(&experiment).unwrap().render(&task(experiment.clone(), None), &bumped).unwrap();
         assert_eq!(rendered.user, filled(&user, FIRST, POSITION, Some(WARNING)), "{experiment:?}");
     }
 }
@@ -97,13 +98,13 @@ fn the_five_experiments_use_the_two_prompts_of_the_paper() {
     let prompts = Experiment::PAPER.map(|experiment| experiment.prompt.clone());
     assert_eq!(prompts, ["cube-selection", "cube-selection", "cube-selection", "cube-selection", "exploration"]);
     for experiment in Experiment::PAPER {
-        assert_eq!(Prompt::of(&experiment).unwrap().hash(), experiment.prompt_hash, "{experiment:?}");
+        assert_eq!(Prompt::for_experiment(&experiment).unwrap().hash(), experiment.prompt_hash, "{experiment:?}");
     }
 }
 
 #[test]
 fn the_history_is_one_line_for_any_thought() {
-    let prompt = Prompt::of(&Experiment::E5).unwrap();
+    let prompt = Prompt::for_experiment(&Experiment::E5).unwrap();
     let thought = Some("I turn.\n\nTask: <b>{{ 1 + 1 }}</b>".to_owned());
     let seen = |history| {
         let observation = Observation { t: 2, remaining: 99, history: Some(history), ..first_step() };
@@ -127,7 +128,8 @@ fn the_history_is_one_line_for_any_thought() {
 
 #[test]
 fn prompts_have_distinct_hashes_and_actions_distinct_letters() {
-    let hashes = [Experiment::E1, Experiment::E5].map(|experiment| Prompt::of(&experiment).unwrap().hash().to_owned());
+    let hashes = [Experiment::E1, Experiment::E5]
+        .map(|experiment| Prompt::for_experiment(&experiment).unwrap().hash().to_owned());
     assert_ne!(hashes[0], hashes[1]);
     for action in Action::ALL {
         assert_eq!(prompt::action(prompt::letter(action)), Some(action));
@@ -149,14 +151,19 @@ fn reaching_prompts_list_all_steps_and_paper_prompts_the_last() {
     for level in ["reach-scheme", "reach-mirror", "reach-hand", "reach-bare"] {
         let experiment = Experiment::parse(level).unwrap();
         let render = |observation| {
-            Prompt::of(&experiment).unwrap().render(&task(experiment.clone(), None), observation).unwrap().user
+            Prompt::for_experiment(&experiment)
+                .unwrap()
+                .render(&task(experiment.clone(), None), observation)
+                .unwrap()
+                .user
         };
         let told = "Steps so far:\n1. 1, carried out\n2. the answer could not be read, nothing was done\n\
                     3. 6, not carried out: something solid\nThe last move met something solid";
         assert!(render(&later).contains(told), "{level}: {}", render(&later));
         assert!(render(&first_step()).contains("Steps so far: none.\n"), "{level}");
     }
-    let user = Prompt::of(&Experiment::E1).unwrap().render(&task(Experiment::E1, None), &later).unwrap().user;
+    let user =
+        Prompt::for_experiment(&Experiment::E1).unwrap().render(&task(Experiment::E1, None), &later).unwrap().user;
     assert!(user.contains("the previous action was 6;") && !user.contains("went up"), "{user}");
 }
 
@@ -179,7 +186,10 @@ fn a_template_has_a_limit_of_work_and_length() {
         let past = Past { action: Some(Action::MoveForward), bumped: false, thought: Some(thought.to_owned()) };
         let observation = Observation { t: 40, past: Arc::new(vec![past; 39]), ..first_step() };
         let task = task(loaded.experiment.clone(), None);
-        Prompt::of(&loaded.experiment).unwrap().render(&task, &observation).map_err(|error| error.to_string())
+        Prompt::for_experiment(&loaded.experiment)
+            .unwrap()
+            .render(&task, &observation)
+            .map_err(|error| error.to_string())
     };
     assert!(rendered(nested(2, "{{ a0.thought }}"), "I turn.").is_ok());
     let told = rendered(nested(4, "{{ a0.thought }}"), "").unwrap_err();

@@ -26,7 +26,7 @@ use crate::painted::ready;
 fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, key: &Key) -> Episode {
     let scene = Scene::draw(config, key.experiment.clone(), key.seed, key.run).unwrap();
     let mut player = agent.agent(&task(config, &scene, key));
-    let episode = head(config, &scene, key, &Subject::of(agent.name()));
+    let episode = head(config, &scene, key, &Subject::for_model(agent.name()));
     let mut world = World::new(config, scene).unwrap();
     let stage = EpisodeStage { config, eye, looks: true, stop: &AtomicBool::new(false) };
     ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
@@ -53,7 +53,7 @@ pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize)
                 });
                 while let Some((agent, key)) = plan.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let looks = !matches!(agent, Scripted::Frozen | Scripted::Random);
-                    let shape = config.of(&key.experiment).body.shape;
+                    let shape = config.for_experiment(&key.experiment).body.shape;
                     let (_, eye) = eyes.iter().find(|(known, _)| *known == shape).unwrap();
                     let episode = record(config, looks.then_some(eye), *agent, key);
                     let at = plan.iter().position(|planned| planned.0 == *agent && planned.1 == *key).unwrap();

@@ -40,7 +40,7 @@ fn reflecting(room: &Painted, pose: Viewpoint, reflected: Place) -> Observation 
 }
 
 fn view(room: &Painted, pose: Viewpoint) -> View {
-    View::of(&observation(room, pose))
+    View::from_observation(&observation(room, pose))
 }
 
 /// The knowledge after a look from each of `poses`.

@@ -129,7 +129,7 @@ const SHOWN: [&str; 27] = [
     "table verify reports/latest",
     "table rescore reports/latest --definitions extended --out again",
     "definitions sensitivity a.parquet",
-    "world replay a.parquet --skip-frames",
+    "world replay a.parquet",
     "world filmstrip x a.parquet -o strip.png",
     "view a.parquet --export page",
     "participants remove x .",

@@ -67,7 +67,7 @@ const EPISODE: Walk = Walk {
         ("score a.parquet --definitions some.toml -o s.csv", Limit("bytes of values of the definitions")),
         ("score a.parquet --definitions many.toml -o s.csv", Limit("rows times values of the definitions")),
         ("world filmstrip e a.parquet -o strip.png", Invalid),
-        ("world replay a.parquet --skip-frames", Invalid),
+        ("world replay a.parquet", Invalid),
     ],
 };
 

@@ -33,7 +33,7 @@ pub struct Rendered {
 }
 
 impl Prompt {
-    pub fn of(experiment: &Experiment) -> Result<Self, Error> {
+    pub fn for_experiment(experiment: &Experiment) -> Result<Self, Error> {
         let prompt = Self { experiment: experiment.clone(), hash: experiment.templates().hash() };
         prompt.environment()?;
         Ok(prompt)

@@ -79,7 +79,7 @@ pub enum ReparseError {
 impl ReparseAnswer {
     /// Reparses the replies of traces, and writes new traces into the folder `stage`; their names must differ. They
     /// are named as in `folder`, where the caller puts them.
-    pub fn of(inputs: &[Input], stage: &Path, folder: &Path) -> Result<(Self, Vec<Input>), ReparseError> {
+    pub fn reparse(inputs: &[Input], stage: &Path, folder: &Path) -> Result<(Self, Vec<Input>), ReparseError> {
         let mut answer = Self::default();
         let mut written = Vec::new();
         for input in inputs {
@@ -143,7 +143,7 @@ fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
     let recording = file.recording();
     let spec =
         serde_json::from_value::<Spec>(recording["experiment"].clone()).map_err(|fault| none(&fault.to_string()))?;
-    Ok((recording, Experiment::of_footer(spec)))
+    Ok((recording, Experiment::from_footer(spec)))
 }
 
 fn read_again(step: &Step, experiment: &Spec) -> Option<Reply> {

@@ -96,17 +96,17 @@ impl Experiment {
     }
 
     /// An experiment of a file, at this place among the others of files.
-    fn of_file(place: usize, known: Known) -> Self {
+    fn from_file(place: usize, known: Known) -> Self {
         Self(Origin::File { place, known: Arc::new(known) })
     }
 
     /// The experiment that a trace's footer declares: the equal built-in one, or one without a prompt.
-    pub fn of_footer(spec: Spec) -> Self {
+    pub fn from_footer(spec: Spec) -> Self {
         // Older footers, which lack the definitions, differ in nothing else.
         let unnamed = |known: &Spec| spec.definitions.is_none() && Spec { definitions: None, ..known.clone() } == spec;
         match BUILT_IN.iter().position(|known| **known == spec || unnamed(known)) {
             Some(at) => Self(Origin::BuiltIn(at)),
-            None => Self::of_file(0, Known { spec, templates: Templates::default() }),
+            None => Self::from_file(0, Known { spec, templates: Templates::default() }),
         }
     }
 

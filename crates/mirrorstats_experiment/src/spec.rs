@@ -3,7 +3,7 @@
 mod answers;
 mod layout;
 mod marks;
-mod panes;
+mod mirrors;
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -14,7 +14,7 @@ use mirrorstats_exact::names;
 pub use answers::{Answer, AnswerType, Fact, Side, UNKNOWN};
 pub use layout::{Behavior, Colors, Cubes, Layout, Occluders, Others, Start, Wall};
 pub use marks::{Mark, MarkColor, Part, Wearer};
-pub use panes::{BodyShown, Paint, Pane, PaneKind};
+pub use mirrors::{BodyShown, Paint, Pane, PaneKind};
 
 /// The maximum number of glass panes (mirrors and windows) in a room.
 pub const MOST_PANES: usize = 4;
@@ -90,9 +90,6 @@ pub struct Spec {
     /// Columns that have no meaning for the task: its traces have none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub absent: Vec<AbsentColumn>,
-    /// How the room and its mirrors look.
-    #[serde(default, skip_serializing_if = "is_default")]
-    pub look: Look,
     /// The shape of all bodies; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<Body>,
@@ -286,17 +283,6 @@ pub enum CameraKind {
     /// A camera behind the body and above it, which looks over its head: 1.1 m behind, 2.0 m high, aimed at a point 1.7 m
     /// above where the body stands.
     Behind,
-}
-
-/// How the room and its mirrors look. What is visible is the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Look {
-    /// Walls of one grey each, mirrors without frame or tint.
-    #[default]
-    Plain,
-    /// Walls of panels, soft shadows, mirrors with a frame of wood and a slight tint.
-    Textured,
 }
 
 /// The shape of all bodies.

@@ -3,7 +3,7 @@
 mod answers;
 mod checks;
 mod hand;
-mod panes;
+mod mirrors;
 
 use std::path::Path;
 
@@ -47,7 +47,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     let before = faults.len();
     check_name(name, at, beside, faults);
     let table: ExperimentTable = mirrorstats_toml_spec::read(at, "an experiment", faults)?;
-    let panes = panes::panes(&table.mirror, &at.key("mirror"), faults);
+    let panes = mirrors::panes(&table.mirror, &at.key("mirror"), faults);
     let first_wall = panes.first().map_or(Wall::Random, |pane| pane.wall);
     let (scenes, layout) = scenes(name, &table, at, first_wall, beside, faults);
     let hand = table.hand.map(|hand| hand::hand(hand, &at.key("hand"), faults));
@@ -97,7 +97,6 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         hand,
         view: table.view,
         absent,
-        look: table.look.unwrap_or_default(),
         body: table.body,
     };
     // An invalid key can break valid relations, so relations of keys with errors are not checked.
@@ -114,7 +113,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     checks::colors(&spec, at, faults);
     checks::marks(&spec, at, faults);
     (faults.len() == before).then(|| Loaded {
-        experiment: Experiment::of_file(beside.place, Known { spec, templates }),
+        experiment: Experiment::from_file(beside.place, Known { spec, templates }),
         name: at.name_place(),
         cubes: at.get("cubes").map_or_else(|| at.name_place(), |cubes| cubes.place()),
         mirrors: at.key("mirror").items().map(|mirror| mirror.name_place()).collect(),

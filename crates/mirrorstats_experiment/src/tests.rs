@@ -54,7 +54,7 @@ fn an_experiment_comes_back_from_a_footer() {
     for experiment in built_in_names().into_iter().flat_map(Experiment::parse) {
         let stored = serde_json::to_string(&*experiment).unwrap();
         let spec = serde_json::from_str(&stored).unwrap();
-        assert_eq!(Experiment::of_footer(spec), experiment, "{stored}");
+        assert_eq!(Experiment::from_footer(spec), experiment, "{stored}");
     }
 }
 

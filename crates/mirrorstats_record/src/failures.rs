@@ -59,7 +59,7 @@ mod tests {
 
     fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
         let key = Key::first(Experiment::E1, 1, run);
-        lost_episode(&key, &Subject::of(model), Some(4), Lost::counted_as(Status::Timeout, cause))
+        lost_episode(&key, &Subject::for_model(model), Some(4), Lost::counted_as(Status::Timeout, cause))
     }
 
     #[test]

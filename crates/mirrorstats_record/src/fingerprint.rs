@@ -26,7 +26,7 @@ pub struct Fingerprint {
 impl Fingerprint {
     /// The fingerprint of an episode, from its trace's metadata and the model's id as the provider returned it.
     /// `renderer` drew the frames that the agent saw, if any.
-    pub fn of(recording: &Value, model: Option<&str>, renderer: Option<&Renderer>) -> Self {
+    pub fn new(recording: &Value, model: Option<&str>, renderer: Option<&Renderer>) -> Self {
         let mut agent = recording["agent"].as_object().cloned().unwrap_or_default();
         let mut experiment = recording["experiment"].clone();
         if let Some(experiment) = experiment.as_object_mut() {
@@ -91,11 +91,11 @@ mod tests {
 
     #[test]
     fn each_change_affects_one_part_of_the_fingerprint() {
-        let base = Fingerprint::of(&recording(), Some("x-1"), None);
+        let base = Fingerprint::new(&recording(), Some("x-1"), None);
         let changed = |change: &dyn Fn(&mut Value), model| {
             let mut other = recording();
             change(&mut other);
-            let other = Fingerprint::of(&other, model, None);
+            let other = Fingerprint::new(&other, model, None);
             assert_ne!(base.id, other.id);
             let (a, b) = (base.parts.as_object().unwrap(), other.parts.as_object().unwrap());
             let keys: Vec<&String> = a.keys().filter(|key| a[*key] != b[*key]).collect();
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(changed(&same, None), "model");
         let mut retitled = recording();
         retitled["experiment"]["title"] = json!("Another title");
-        assert_eq!(Fingerprint::of(&retitled, Some("x-1"), None), base);
+        assert_eq!(Fingerprint::new(&retitled, Some("x-1"), None), base);
     }
 
     #[test]
@@ -125,9 +125,9 @@ mod tests {
             vendor: Some("Mesa".to_owned()),
             processor: Some(processor.to_owned()),
         };
-        let unseen = Fingerprint::of(&recording(), None, None);
+        let unseen = Fingerprint::new(&recording(), None, None);
         let [one, other] = ["x86_64 avx2", "x86_64 limited to sse2"]
-            .map(|processor| Fingerprint::of(&recording(), None, Some(&renderer(processor))));
+            .map(|processor| Fingerprint::new(&recording(), None, Some(&renderer(processor))));
         assert!(unseen.id != one.id && one.id != other.id);
         assert_eq!(unseen.parts.get("renderer"), None);
         assert_eq!(other.parts["renderer"]["processor"], "x86_64 limited to sse2");
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn the_order_of_keys_does_not_matter() {
         let [one, other] = [r#"{"agent":{"a":1,"b":2}}"#, r#"{"agent":{"b":2,"a":1}}"#];
-        let of = |text: &str| Fingerprint::of(&serde_json::from_str(text).unwrap(), None, None);
+        let of = |text: &str| Fingerprint::new(&serde_json::from_str(text).unwrap(), None, None);
         assert_eq!(of(one), of(other));
         assert_eq!(of(one).id.len(), 16);
     }

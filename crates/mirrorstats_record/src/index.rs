@@ -40,7 +40,7 @@ impl RecordingIndex {
     }
 
     pub(crate) fn recording(&self, experiment: &Experiment) -> &Value {
-        self.recordings.of(experiment)
+        self.recordings.get(experiment)
     }
 
     pub fn trace(&self, experiment: &Experiment) -> PathBuf {

@@ -36,7 +36,7 @@ impl Recordings {
     }
 
     /// The metadata of an experiment; null if it is not recorded.
-    pub fn of(&self, experiment: &Experiment) -> &Value {
+    pub fn get(&self, experiment: &Experiment) -> &Value {
         self.0.get(experiment).unwrap_or(&Value::Null)
     }
 }
@@ -51,7 +51,7 @@ fn recording(
     condition: Option<&str>,
     registration: Option<&Registration>,
 ) -> Value {
-    let config = &config.of(experiment);
+    let config = &config.for_experiment(experiment);
     let mut recording = json!({
         "version": VERSION,
         "kind": "recording",

@@ -39,7 +39,7 @@ pub struct Subject {
 }
 
 impl Subject {
-    pub fn of(model: &str) -> Self {
+    pub fn for_model(model: &str) -> Self {
         Self { model: model.to_owned(), condition: None }
     }
 
@@ -162,7 +162,7 @@ const EXPECTED: &str = "experiments such as E1, E1..E5, E1,E3 or mine.toml";
 
 impl Experiments {
     /// Parses typed experiments, for file names with arbitrary bytes.
-    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
+    pub fn parse(typed: &OsStr) -> Result<Self, NotAPlan> {
         let mut found = BTreeSet::new();
         for part in parts(typed) {
             let file = part.to_str().map_or(part.as_os_str(), |text| OsStr::new(text.trim()));
@@ -207,7 +207,7 @@ mod tests {
 
     #[test]
     fn experiments_come_as_names_ranges_and_lists() {
-        let read = |text: &str| Experiments::of(text.as_ref()).map(|list| list.0);
+        let read = |text: &str| Experiments::parse(text.as_ref()).map(|list| list.0);
         assert_eq!(read("E1").unwrap(), [E1].map(Named::BuiltIn));
         assert_eq!(read("E1..E3").unwrap(), [E1, E2, E3].map(Named::BuiltIn));
         assert_eq!(read("E5,E1, E1").unwrap(), [E1, E5].map(Named::BuiltIn));
@@ -236,7 +236,7 @@ mod tests {
     fn the_first_repetition_has_an_unsuffixed_id_and_a_fixed_seed() {
         let first = Key::first(E1, 1, 3);
         let again = Key { repetition: 2, ..first.clone() };
-        let subject = Subject::of("oracle");
+        let subject = Subject::for_model("oracle");
         assert_eq!(
             (first.episode_id(&subject), again.episode_id(&subject)),
             ("E1/oracle/s1/r3".into(), "E1/oracle/s1/r3/x2".into())

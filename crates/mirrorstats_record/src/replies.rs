@@ -66,7 +66,7 @@ impl Replies {
             return None;
         }
         let is_first_in_time = found.first.is_none();
-        let reply = UnreadableReply::of(subject, key, step, row, status);
+        let reply = UnreadableReply::new(subject, key, step, row, status);
         found.first = Some((key.clone(), step, reply.clone()));
         is_first_in_time.then_some(reply)
     }
@@ -85,7 +85,7 @@ impl Replies {
 }
 
 impl UnreadableReply {
-    pub(super) fn of(subject: &Subject, key: &Key, step: i32, row: &Step, status: &str) -> Self {
+    pub(super) fn new(subject: &Subject, key: &Key, step: i32, row: &Step, status: &str) -> Self {
         let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
         let fault = row.extra.reply_fault.as_deref().map(beginning);
         Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text, fault }
@@ -159,7 +159,7 @@ impl Unusable {
         let in_a_row = found.in_a_row.max(*in_episode);
         let is_over = self.most.is_some_and(|most| in_a_row >= most.get());
         if is_over && found.given_up.is_none() {
-            let last = UnreadableReply::of(subject, key, t, row, status);
+            let last = UnreadableReply::new(subject, key, t, row, status);
             found.given_up = Some(GivenUp { model: subject.model.clone(), in_a_row, last });
         }
         is_over
@@ -189,12 +189,12 @@ mod tests {
     fn one_unusable_reply_is_printed_and_the_earliest_is_reported() {
         let replies = Replies::default();
         let key = |run| Key::first(Experiment::E1, 1, run);
-        assert_eq!(replies.add(&Subject::of("m"), &key(2), 1, &row("ok", None)), None);
+        assert_eq!(replies.add(&Subject::for_model("m"), &key(2), 1, &row("ok", None)), None);
         assert_eq!(replies.answer().first_unreadable, None);
-        let told = replies.add(&Subject::of("m"), &key(2), 3, &row("parse_failed", Some("later"))).unwrap();
+        let told = replies.add(&Subject::for_model("m"), &key(2), 3, &row("parse_failed", Some("later"))).unwrap();
         assert_eq!((told.step, told.text.as_deref()), (3, Some("later")));
-        assert_eq!(replies.add(&Subject::of("m"), &key(1), 9, &row("refusal", Some(" \n"))), None);
-        assert_eq!(replies.add(&Subject::of("m"), &key(1), 10, &row("parse_failed", None)), None);
+        assert_eq!(replies.add(&Subject::for_model("m"), &key(1), 9, &row("refusal", Some(" \n"))), None);
+        assert_eq!(replies.add(&Subject::for_model("m"), &key(1), 10, &row("parse_failed", None)), None);
         let answer = replies.answer();
         let first = answer.first_unreadable.unwrap();
         assert_eq!((first.episode_id.as_str(), first.step, first.text), ("E1/m/s1/r1", 9, None));
@@ -221,7 +221,13 @@ mod tests {
         let mut in_episodes = [0; 4];
         let add = |(run, status): &(i32, &str)| {
             let key = Key::first(Experiment::E1, 1, *run);
-            unusable.add(&Subject::of("m"), &key, 7, &said(status), &mut in_episodes[usize::try_from(*run).unwrap()])
+            unusable.add(
+                &Subject::for_model("m"),
+                &key,
+                7,
+                &said(status),
+                &mut in_episodes[usize::try_from(*run).unwrap()],
+            )
         };
         let at = replies.iter().position(add);
         (at.map(|at| at + 1), unusable)

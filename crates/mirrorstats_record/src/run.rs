@@ -150,7 +150,7 @@ impl Recording<'_> {
     fn episodes(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let is_needed = self.settings.frames || self.player.looks();
         let eyes =
-            is_needed.then(|| Eyes::of(self.config, queue.experiments())).transpose().map_err(RecordError::fatal)?;
+            is_needed.then(|| Eyes::new(self.config, queue.experiments())).transpose().map_err(RecordError::fatal)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {

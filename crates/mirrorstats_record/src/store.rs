@@ -84,7 +84,7 @@ impl Store {
     /// The fingerprint of an episode, given the model's id as the provider returned it and the renderer of the frames
     /// that the agent saw.
     pub fn fingerprint(&self, key: &Key, model: Option<&str>, renderer: Option<&Renderer>) -> Fingerprint {
-        Fingerprint::of(self.index.recording(&key.experiment), model, renderer)
+        Fingerprint::new(self.index.recording(&key.experiment), model, renderer)
     }
 
     /// Commits an episode whose log, if any, is already committed.

@@ -33,7 +33,7 @@ pub struct SheetPicture {
 /// An experiment from above; at the start; before the mirror, nearby and from the side, with every mark. The pictures use the
 /// experiment's settings.
 pub fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<Vec<SheetPicture>, ContactSheetError> {
-    let eye = &mut Camera::new(&config.of(experiment))?;
+    let eye = &mut Camera::new(&config.for_experiment(experiment))?;
     let scene = Scene::draw(config, experiment.clone(), seed, 1)?;
     let mut world = World::new(config, scene)?;
     let name = experiment.name();

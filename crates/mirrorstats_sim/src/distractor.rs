@@ -20,7 +20,7 @@ pub(crate) struct Distractor {
 
 impl Distractor {
     pub fn new(other: &Other) -> Self {
-        let mut chance = Rng::of_number(u64::from(other.habit));
+        let mut chance = Rng::from_number(u64::from(other.habit));
         let strides = 2 + chance.below(6);
         Self { figure: Figure::standing(other.start), chance, turns: 0, strides, waited: 0 }
     }

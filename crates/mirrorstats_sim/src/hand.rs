@@ -24,7 +24,7 @@ pub(super) struct HandRules<'a> {
 
 impl<'a> HandRules<'a> {
     /// The units and limits in a scene; `None` without a hand.
-    pub fn of(scene: &Scene, config: &'a WorldConfig) -> Option<Self> {
+    pub fn for_scene(scene: &Scene, config: &'a WorldConfig) -> Option<Self> {
         let patch = scene.marks.iter().find(|mark| mark.part == Part::Front)?.patch?;
         Some(Self { task: scene.experiment.hand?, patch, hand: scene.hand?, config, body: scene.start })
     }

@@ -4,7 +4,7 @@
 //! everything restarts from the same stream. Acceptance depends only on comparisons, never on the order of a sum.
 
 mod balance;
-mod panes;
+mod mirrors;
 mod reach;
 
 use std::collections::BTreeMap;
@@ -43,14 +43,14 @@ pub struct Crowded {
 impl Scene {
     /// Draws the scene of one episode. The experiment's lengths and counts override the configuration.
     pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
-        let config = &config.of(&experiment);
+        let config = &config.for_experiment(&experiment);
         let purpose = purpose(&experiment);
         let body_color = body_color(&experiment, purpose, seed, run);
-        let mut chance = Rng::of(purpose, seed, run);
+        let mut chance = Rng::for_run(purpose, seed, run);
         let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(&experiment, body_color));
         let Some(scene) = drawn else { return Err(Crowded { experiment, seed, run }) };
-        let layout = panes::PaneLayout { config, scene: &scene };
-        let panes::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
+        let layout = mirrors::PaneLayout { config, scene: &scene };
+        let mirrors::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
         if experiment.hand.is_some() && hand.is_none() {
             return Err(Crowded { experiment, seed, run });
         }
@@ -69,7 +69,7 @@ pub struct DoesNotFit {
 
 /// The reason why an experiment does not fit into a room, found by drawing a study of it; `None` if it fits.
 pub fn crowded(config: &WorldConfig, experiment: &Experiment) -> Option<DoesNotFit> {
-    let world = config.of(experiment);
+    let world = config.for_experiment(experiment);
     let widest = world.room.size - 2.0 * world.placement.wall_margin;
     let widths = experiment.panes.iter().map(|pane| pane.width_mm.map_or(world.mirror.width, metres));
     if let Some((at, width)) = widths.enumerate().find(|(_, width)| *width > widest) {
@@ -123,7 +123,7 @@ impl Occlusion {
     /// The occlusion of an experiment in words; `None` without clutter, or if its scenes do not fit into the room.
     pub fn described(config: &WorldConfig, experiment: &Experiment) -> Option<String> {
         let has_clutter = matches!(experiment.layout.cubes, Cubes::Clutter { .. });
-        let Self { places, hidden, shares } = has_clutter.then(|| Self::of(config, experiment)).flatten()?;
+        let Self { places, hidden, shares } = has_clutter.then(|| Self::measured(config, experiment)).flatten()?;
         #[expect(clippy::cast_precision_loss, reason = "some hundred places")]
         let [mean, half] = [shares, hidden as f64].map(|sum| 100.0 * sum / places as f64);
         Some(format!(
@@ -133,10 +133,10 @@ impl Occlusion {
     }
 
     /// The occlusion of an experiment; `None` if its scenes do not fit into the room.
-    pub fn of(config: &WorldConfig, experiment: &Experiment) -> Option<Self> {
+    pub fn measured(config: &WorldConfig, experiment: &Experiment) -> Option<Self> {
         study().try_fold(Self::default(), |sum, (seed, run)| {
             let scene = Scene::draw(config, experiment.clone(), seed, run).ok()?;
-            let found = reach::occlusion(&config.of(experiment), &scene);
+            let found = reach::occlusion(&config.for_experiment(experiment), &scene);
             Some(Self {
                 places: sum.places + found.places,
                 hidden: sum.hidden + found.hidden,
@@ -156,10 +156,10 @@ fn purpose(experiment: &Spec) -> u64 {
 fn body_color(experiment: &Spec, purpose: u64, seed: i32, run: i32) -> Color {
     let mut palette = experiment.layout.palette.clone();
     match experiment.layout.colors {
-        Colors::Random => Rng::of(!purpose, seed, run).one_of(&palette),
+        Colors::Random => Rng::for_run(!purpose, seed, run).one_of(&palette),
         Colors::Balanced => {
             // A different order of colours for other scenes, equal for all of their seeds and runs.
-            shuffle(&mut palette, &mut Rng::of_number(purpose));
+            shuffle(&mut palette, &mut Rng::from_number(purpose));
             palette[balance::index(palette.len(), seed, run)]
         }
     }

@@ -10,12 +10,12 @@ pub struct Rng(Pcg64);
 
 impl Rng {
     /// The stream of these whole numbers; different numbers give different streams.
-    pub fn of(purpose: u64, seed: i32, run: i32) -> Self {
+    pub fn for_run(purpose: u64, seed: i32, run: i32) -> Self {
         let episode = (u64::from(seed.cast_unsigned()) << 32) | u64::from(run.cast_unsigned());
-        Self::of_number(mixed(episode) ^ purpose)
+        Self::from_number(mixed(episode) ^ purpose)
     }
 
-    pub(crate) fn of_number(number: u64) -> Self {
+    pub(crate) fn from_number(number: u64) -> Self {
         // Neighbouring numbers must not give neighbouring states, which would be noticeable at first.
         let [low, high] = [mixed(number), mixed(mixed(number))];
         Self(Pcg64::new((u128::from(high) << 64) | u128::from(low), 0))
@@ -69,7 +69,7 @@ mod tests {
 
     #[test]
     fn draws_are_roughly_uniform() {
-        let mut chance = Rng::of(1, 2, 3);
+        let mut chance = Rng::for_run(1, 2, 3);
         let mut counts = [0_u32; 7];
         for _ in 0..70_000 {
             counts[usize::try_from(chance.between(-3, 3) + 3).unwrap()] += 1;
@@ -80,7 +80,7 @@ mod tests {
     #[test]
     fn streams_are_these_on_every_machine() {
         let drawn = |seed, run| {
-            let mut chance = Rng::of(1, seed, run);
+            let mut chance = Rng::for_run(1, seed, run);
             [chance.below(1000), chance.below(1000), chance.below(1000)]
         };
         assert_eq!(drawn(0, 0), drawn(0, 0));

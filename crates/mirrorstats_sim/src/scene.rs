@@ -309,7 +309,7 @@ impl Scene {
                 let way: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
                 (way + task.extra_steps).min(self.experiment.steps.unwrap_or(u32::MAX))
             }
-            _ => config.of(&self.experiment).episode.steps,
+            _ => config.for_experiment(&self.experiment).episode.steps,
         }
     }
 

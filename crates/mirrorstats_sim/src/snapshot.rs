@@ -76,8 +76,7 @@ fn frames(world: &World) -> Vec<Placed> {
 fn solids(stage: &Stage) -> Vec<Solid> {
     let model = stage.model();
     (0..stage.items().len())
-        // Only shadows are translucent.
-        .filter(|geom| stage.is_shown(*geom) && model.geom_rgba()[*geom][3] >= 1.0)
+        .filter(|geom| stage.is_shown(*geom))
         .map(|geom| Solid {
             name: model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned(),
             item: stage.items()[geom],

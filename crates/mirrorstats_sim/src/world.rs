@@ -11,8 +11,8 @@ use super::distractor::Distractor;
 use super::floor::FloorPlan;
 use super::hand::{self, HandRules};
 use super::label_image::LabelImage;
+use super::mirror_eye;
 use super::model::{AGENTS, BODIES, ModelError, PaintMode, SceneMoment, Sight, Stage};
-use super::passage;
 use super::scene::Scene;
 use mirrorstats_experiment::spec::{Behavior, PaneKind};
 use mirrorstats_trace::episodes::episode::Action;
@@ -45,7 +45,7 @@ pub struct World {
 impl World {
     /// The world of a scene at its start. The experiment's lengths and counts override the configuration.
     pub fn new(config: &WorldConfig, scene: Scene) -> Result<Self, ModelError> {
-        let config = config.of(&scene.experiment);
+        let config = config.for_experiment(&scene.experiment);
         let (stage, beyond) = Stage::all(&config, PaintMode::Lit, &scene)?;
         let mut world = Self {
             plan: scene.floor_plan(&config),
@@ -116,17 +116,17 @@ impl World {
     }
 
     pub fn eye_beyond(&self, pane: usize) -> Pose {
-        passage::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
+        mirror_eye::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
     }
 
     /// The Manhattan distance from the hand to the mark, mm; `None` without a hand.
     pub fn target_distance(&self) -> Option<i32> {
-        let place = HandRules::of(&self.scene, &self.config)?;
+        let place = HandRules::for_scene(&self.scene, &self.config)?;
         i32::try_from(place.distance_mm(*self.hand.back()?)).ok()
     }
 
     pub fn is_reached(&self) -> bool {
-        HandRules::of(&self.scene, &self.config)
+        HandRules::for_scene(&self.scene, &self.config)
             .zip(self.hand.back())
             .is_some_and(|(place, from_mark)| place.is_reached(*from_mark))
     }
@@ -138,13 +138,13 @@ impl World {
 
     fn hand_back(&self, steps: u32) -> Option<[f64; 3]> {
         let at = self.hand.len().saturating_sub(1 + steps as usize);
-        Some(HandRules::of(&self.scene, &self.config)?.center(*self.hand.get(at)?))
+        Some(HandRules::for_scene(&self.scene, &self.config)?.center(*self.hand.get(at)?))
     }
 
     fn reach(&mut self, step: [i32; 3]) -> Moved {
         let Some(from) = self.hand.back().copied() else { return Moved::default() };
         let to = [0, 1, 2].map(|axis| from[axis].saturating_add(step[axis]));
-        let is_free = HandRules::of(&self.scene, &self.config).is_some_and(|place| place.is_free(to));
+        let is_free = HandRules::for_scene(&self.scene, &self.config).is_some_and(|place| place.is_free(to));
         self.hand.push_back(if is_free { to } else { from });
         Moved { bumped: !is_free }
     }

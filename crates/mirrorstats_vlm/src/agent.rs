@@ -42,7 +42,7 @@ impl Agent for VlmAgent {
 
 impl VlmAgent {
     async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
-        let words = Prompt::of(&self.task.experiment)
+        let words = Prompt::for_experiment(&self.task.experiment)
             .and_then(|prompt| prompt.render(&self.task, observation))
             .map_err(|fault| self.vlm.halt(Lost::because(format!("the prompt cannot be made: {fault}"))))?;
         let schema = reply::structure(&self.task.experiment);

@@ -5,7 +5,7 @@
 //! of zero.
 
 use crate::models::Choice;
-use crate::wire_format::Dialect;
+use crate::wire_format::WireFormat;
 use mirrorstats_agents::prompt::Prompt;
 use mirrorstats_agents::{Observation, Past, Task, reply};
 use mirrorstats_experiment::Experiment;
@@ -19,29 +19,29 @@ const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn ri
                        own body in it, so that I can find out which colour I am before I go to a cube.";
 
 pub fn prompt_tokens(choice: &Choice, experiment: &Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
-    let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
+    let words = Prompt::for_experiment(experiment)?.render(&task(experiment), &observation())?;
     let schema = reply::structure(experiment);
     let characters = choice.body(&words, &schema, "").to_string().chars().count() as u64;
-    Ok(characters.div_ceil(CHARACTERS) + frame_tokens(choice.backend.dialect, view))
+    Ok(characters.div_ceil(CHARACTERS) + frame_tokens(choice.backend.wire_format, view))
 }
 
 /// The tokens of a frame of this width and height.
-pub(crate) fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
+pub(crate) fn frame_tokens(wire_format: WireFormat, [width, height]: [u32; 2]) -> u64 {
     let (width, height) = (u64::from(width), u64::from(height));
-    match dialect {
+    match wire_format {
         // 85, plus 170 per tile of 512 x 512 after the shorter side is scaled down to at most 768.
-        Dialect::OpenaiChat => {
+        WireFormat::OpenaiChat => {
             let side = |pixels: u64| (pixels * 768).div_ceil(width.min(height).max(768)).div_ceil(512);
             85 + 170 * side(width) * side(height)
         }
         // 258 up to 384 x 384, otherwise 258 per tile: crops of two thirds of the shorter side, 256 to 768 pixels.
-        Dialect::Gemini if width.max(height) <= 384 => 258,
-        Dialect::Gemini => {
+        WireFormat::Gemini if width.max(height) <= 384 => 258,
+        WireFormat::Gemini => {
             let tile = (width.min(height) * 2 / 3).clamp(256, 768);
             258 * width.div_ceil(tile) * height.div_ceil(tile)
         }
         // One token per 750 pixels; other models' servers differ, and few take more.
-        Dialect::AnthropicMessages | Dialect::OpenaiCompatible => (width * height).div_ceil(750),
+        WireFormat::AnthropicMessages | WireFormat::OpenaiCompatible => (width * height).div_ceil(750),
     }
 }
 
@@ -68,18 +68,18 @@ fn observation() -> Observation {
 
 #[cfg(test)]
 mod tests {
-    use super::{Dialect, Experiment, frame_tokens, prompt_tokens};
+    use super::{Experiment, WireFormat, frame_tokens, prompt_tokens};
     use crate::models::{Contract, Models};
 
     #[test]
     fn a_frame_counts_as_its_provider_says() {
-        let of = |dialect, view| frame_tokens(dialect, view);
-        assert_eq!(of(Dialect::OpenaiChat, [640, 480]), 85 + 2 * 170);
-        assert_eq!(of(Dialect::OpenaiChat, [512, 512]), 85 + 170);
-        assert_eq!(of(Dialect::OpenaiChat, [1536, 1536]), 85 + 4 * 170);
-        assert_eq!(of(Dialect::Gemini, [384, 384]), 258);
-        assert_eq!(of(Dialect::Gemini, [640, 480]), 258 * 4);
-        assert_eq!(of(Dialect::AnthropicMessages, [640, 480]), 410);
+        let of = |wire_format, view| frame_tokens(wire_format, view);
+        assert_eq!(of(WireFormat::OpenaiChat, [640, 480]), 85 + 2 * 170);
+        assert_eq!(of(WireFormat::OpenaiChat, [512, 512]), 85 + 170);
+        assert_eq!(of(WireFormat::OpenaiChat, [1536, 1536]), 85 + 4 * 170);
+        assert_eq!(of(WireFormat::Gemini, [384, 384]), 258);
+        assert_eq!(of(WireFormat::Gemini, [640, 480]), 258 * 4);
+        assert_eq!(of(WireFormat::AnthropicMessages, [640, 480]), 410);
     }
 
     #[test]

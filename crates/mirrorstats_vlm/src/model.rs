@@ -87,15 +87,15 @@ impl Vlm {
         account: Arc<Account>,
     ) -> Self {
         let (provider, network) = (Some(provider), Some(network));
-        Self { provider, network, account, ..Self::of(choice, Memory::Journals(journals)) }
+        Self { provider, network, account, ..Self::new(choice, Memory::Journals(journals)) }
     }
 
     /// A model whose answers are replayed from journals; it needs no key and sends nothing.
     pub fn cassette(choice: Choice, folder: PathBuf) -> Self {
-        Self::of(choice, Memory::Cassette(folder))
+        Self::new(choice, Memory::Cassette(folder))
     }
 
-    fn of(choice: Choice, memory: Memory) -> Self {
+    fn new(choice: Choice, memory: Memory) -> Self {
         Self {
             choice,
             provider: None,
@@ -196,13 +196,13 @@ impl Vlm {
     }
 
     pub(super) fn read(&self, body: &str) -> Option<ModelAnswer> {
-        self.choice.backend.dialect.read(body).ok()?
+        self.choice.backend.wire_format.read(body).ok()?
     }
 
     /// The maximum tokens of a request with this many bytes of words, and of its reply. A token of words has at least
     /// one byte; for a frame, providers have counted up to twice the documented tokens.
     pub(super) fn at_most(&self, bytes: usize, view: [u32; 2]) -> [u64; 2] {
-        let frame = estimate::frame_tokens(self.choice.backend.dialect, view);
+        let frame = estimate::frame_tokens(self.choice.backend.wire_format, view);
         [bytes as u64 + 2 * frame, self.max_output_tokens().into()]
     }
 

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
-use super::wire_format::{Dialect, Effort, ModelAnswer};
+use super::wire_format::{Effort, ModelAnswer, WireFormat};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::input;
 use mirrorstats_exact::names;
@@ -38,8 +38,8 @@ pub struct Models {
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Backend {
-    /// The language it speaks.
-    pub dialect: Dialect,
+    /// The shape of its requests and answers.
+    pub wire_format: WireFormat,
     /// The base of its paths; `--base-url` replaces it.
     pub base_url: Option<String>,
     /// The environment variable with the key.

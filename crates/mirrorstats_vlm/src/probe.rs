@@ -68,7 +68,7 @@ impl ProbeAnswer {
         self.fault.is_none() && self.is_model && self.parameters.iter().all(|parameter| parameter.taken == Some(true))
     }
 
-    fn of(choice: &Choice) -> Self {
+    fn new(choice: &Choice) -> Self {
         let model = &choice.model;
         let sent = [
             ("temperature", model.temperature.map(Value::from)),
@@ -115,7 +115,7 @@ pub async fn probe(mut choice: Choice, provider: &Provider, experiment: &Spec, v
         system: "You test a connection.".to_owned(),
         user: "The image is a test. Reply with the single word ready, and with no JSON.".to_owned(),
     };
-    let mut probed = ProbeAnswer::of(&choice);
+    let mut probed = ProbeAnswer::new(&choice);
     if let Err(fault) = provider.connect() {
         return ProbeAnswer { fault: Some(fault.to_string()), ..probed };
     }

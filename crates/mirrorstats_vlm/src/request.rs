@@ -13,7 +13,7 @@ pub struct NoTier {
 impl Choice {
     /// Asks for the flex tier: half the price, and answers that take minutes.
     pub fn use_flex_tier(&mut self) -> Result<(), NoTier> {
-        let Some(key) = self.backend.dialect.tier_key() else {
+        let Some(key) = self.backend.wire_format.tier_key() else {
             return Err(NoTier { backend: self.model.backend.clone() });
         };
         self.model.extra_body.insert(key.to_owned(), "flex".into());
@@ -25,7 +25,7 @@ impl Choice {
 
     /// The body of a request with this frame, as PNG in base64.
     pub(super) fn body(&self, words: &prompt::Rendered, schema: &Value, png: &str) -> Value {
-        let mut body = self.backend.dialect.body(&Question {
+        let mut body = self.backend.wire_format.body(&Question {
             model: &self.model.id,
             system: &words.system,
             user: &words.user,

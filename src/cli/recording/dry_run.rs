@@ -74,7 +74,7 @@ impl ForecastAnswer {
             asked,
             found: asked - todo.len(),
             episodes: todo.iter().map(|key| key.episode_id(subject)).collect(),
-            steps_at_most: todo.iter().map(|key| u64::from(config.of(&key.experiment).episode.steps)).sum(),
+            steps_at_most: todo.iter().map(|key| u64::from(config.for_experiment(&key.experiment).episode.steps)).sum(),
             requests,
         }
     }
@@ -96,7 +96,7 @@ impl RequestForecast {
         let mut forecast = Self::default();
         for key in todo {
             let answered = vlm.answered(&key.file_stem(subject))?;
-            let left = u64::from(config.of(&key.experiment).episode.steps).saturating_sub(answered);
+            let left = u64::from(config.for_experiment(&key.experiment).episode.steps).saturating_sub(answered);
             forecast.answered += answered;
             forecast.at_most += left;
             forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), &key.experiment, view)?;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::cli::{Failure, output};
 use mirrorstats_agents::human::Human;
-use mirrorstats_agents::human::design::{Design, Order, Schedule};
+use mirrorstats_agents::human::design::{Design, Schedule};
 use mirrorstats_agents::human::hub::{Eraser, Hub};
 use mirrorstats_agents::human::journal::ParticipantJournal;
 use mirrorstats_agents::human::seat::Terms;
@@ -36,10 +36,6 @@ pub struct HumanArgs {
     /// everyone plays --seeds seeds of their own
     #[arg(long, value_name = "DESIGN", default_value = "split", value_parser = design)]
     design: Design,
-    /// In which order: planned, by experiment, seed and run; counterbalanced, by the rows of a Latin square [default:
-    /// counterbalanced if crossed, else planned]
-    #[arg(long, value_name = "ORDER", value_parser = order)]
-    order: Option<Order>,
     /// A text that participants agree to before they begin
     #[arg(long, value_name = "FILE")]
     consent: Option<PathBuf>,
@@ -87,9 +83,7 @@ impl HumanArgs {
         let eraser: Eraser = |folder, code| {
             remove_episodes(folder, code).map(|removed| removed.episodes).map_err(|error| error.to_string())
         };
-        let by_design = if self.design == Design::Crossed { Order::Counterbalanced } else { Order::Planned };
-        let order = self.order.unwrap_or(by_design);
-        let schedule = Schedule { design: self.design, order, seeds, repeats };
+        let schedule = Schedule { design: self.design, seeds, repeats };
         let hub = Arc::new(Hub::new(people.clone(), terms, schedule, journal, eraser));
         if plays {
             hub.delete_due().map_err(Failure::input)?;
@@ -156,10 +150,6 @@ fn enrol(journal: &ParticipantJournal, code: &str, place: usize) -> io::Result<S
 
 fn design(text: &str) -> Result<Design, String> {
     Design::named(text).ok_or_else(|| format!("expected {}", Design::ALL.map(Design::name).join(", ")))
-}
-
-fn order(text: &str) -> Result<Order, String> {
-    Order::named(text).ok_or_else(|| format!("expected {}", Order::ALL.map(Order::name).join(" or ")))
 }
 
 /// Parses a code, which is not a name: letters, digits, `-` and `_`.

@@ -70,7 +70,7 @@ pub(crate) struct Bar<'a> {
 
 impl<'a> Bar<'a> {
     pub(crate) fn new(player: &'a AnyPlayer, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
-        let steps_of = |key: &Key| u64::from(world.of(&key.experiment).episode.steps);
+        let steps_of = |key: &Key| u64::from(world.for_experiment(&key.experiment).episode.steps);
         let budget: BTreeMap<Experiment, u64> =
             todo.iter().map(|key| (key.experiment.clone(), steps_of(key))).collect();
         let planned = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
@@ -184,7 +184,7 @@ impl Progress for Bar<'_> {
 mod tests {
     use std::time::Duration;
 
-    use super::{Bar, rate, time_left};
+    use super::{AnyPlayer, Bar, rate, time_left};
     use mirrorstats_agents::scripted::Scripted;
     use mirrorstats_agents::{Player, exec};
     use mirrorstats_experiment::Experiment;
@@ -195,8 +195,8 @@ mod tests {
 
     #[test]
     fn the_progress_counts_unreadable_replies() {
-        let player = Scripted::named("frozen").unwrap();
-        let subject = Subject::of("frozen");
+        let player = AnyPlayer::Other(Box::new(Scripted::named("frozen").unwrap()));
+        let subject = Subject::for_model("frozen");
         let todo = [1, 2].map(|run| Key::first(Experiment::E1, 1, run));
         let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
         let row = |status: &str| {
@@ -215,8 +215,8 @@ mod tests {
 
     #[test]
     fn the_time_left_follows_the_episodes_that_ended() {
-        let player = Scripted::named("frozen").unwrap();
-        let subject = Subject::of("frozen");
+        let player = AnyPlayer::Other(Box::new(Scripted::named("frozen").unwrap()));
+        let subject = Subject::for_model("frozen");
         let todo = [1, 2, 3, 4].map(|run| Key::first(Experiment::E1, 1, run));
         let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
         let all = bar.line.length().unwrap();
@@ -239,9 +239,9 @@ mod tests {
             standard_error: std::env::temp_dir(),
         };
         let (program, scripted) = (exec::Exec::new(settings).unwrap(), Scripted::named("frozen").unwrap());
-        let subject = Subject::of("own");
+        let subject = Subject::for_model("own");
         let world = WorldConfig::default();
-        let has_news = |player: &dyn Player| Bar::new(player, &subject, &[], &world).has_news();
-        assert_eq!([has_news(&program), has_news(&scripted)], [true, false]);
+        let has_news = |player: Box<dyn Player>| Bar::new(&AnyPlayer::Other(player), &subject, &[], &world).has_news();
+        assert_eq!([has_news(Box::new(program)), has_news(Box::new(scripted))], [true, false]);
     }
 }

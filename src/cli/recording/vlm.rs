@@ -20,7 +20,7 @@ use mirrorstats_vlm::limits::{Account, Limits};
 use mirrorstats_vlm::models::{Choice, Models, ModelsError};
 use mirrorstats_vlm::probe::{ProbeAnswer, probe};
 use mirrorstats_vlm::provider::{Patience, Provider, check_transport};
-use mirrorstats_vlm::wire_format::{Dialect, Effort};
+use mirrorstats_vlm::wire_format::{Effort, WireFormat};
 
 /// A service tier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -110,7 +110,7 @@ impl VlmArgs {
             return Ok(VlmPlayer::of_journals(vlm, 1));
         }
         // A router reports the cost of an answer; for others it is unknown without prices.
-        let may_say = choice.backend.dialect == Dialect::OpenaiCompatible && choice.model.backend != OWN_SERVER;
+        let may_say = choice.backend.wire_format == WireFormat::OpenaiCompatible && choice.model.backend != OWN_SERVER;
         if self.max_cost.is_some() && !may_say {
             choice.check_prices().map_err(Failure::input)?;
         }
@@ -182,10 +182,10 @@ impl VlmArgs {
             return Err(Failure::input(format!("the backend of `{}` has no address; give --base-url", choice.name)));
         };
         let secret = Secret::from_environment(&choice.backend.key);
-        let secret = match (secret, choice.backend.dialect) {
+        let secret = match (secret, choice.backend.wire_format) {
             (Ok(secret), _) => Some(secret),
             // The user's own servers mostly need no key.
-            (Err(_), Dialect::OpenaiCompatible) if self.base_url.is_some() => None,
+            (Err(_), WireFormat::OpenaiCompatible) if self.base_url.is_some() => None,
             (Err(missing), _) => return Err(Failure::input(missing)),
         };
         if secret.is_some() {
@@ -197,7 +197,7 @@ impl VlmArgs {
             interval: self.requests_per_minute.map_or(Duration::ZERO, |count| Duration::from_mins(1) / count),
             ..Patience::default()
         };
-        Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, in_flight)
+        Provider::new(url, choice.backend.wire_format, &choice.model.id, secret, patience, in_flight)
             .map_err(Failure::input)
     }
 }

@@ -18,7 +18,7 @@ use {
 /// Parses typed experiments; a file name may have any bytes.
 #[cfg(feature = "sim")]
 pub fn parser() -> impl TypedValueParser<Value = Experiments> {
-    OsStringValueParser::new().try_map(|typed| Experiments::of(&typed))
+    OsStringValueParser::new().try_map(|typed| Experiments::parse(&typed))
 }
 
 pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {

@@ -1,7 +1,7 @@
 //! A model behind a server on loopback, from the command line: the spending is reported, and a failing server loses an
 //! episode under the failure's name.
 
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::Value;
 
 use super::recordings::{Bench, FORWARD, done, outcome};
@@ -9,7 +9,7 @@ use crate::vlm::server::{JSON, Server, http, spoken};
 
 /// An answer with this status and reply.
 fn answer(status: &str, reply: &str) -> Vec<u8> {
-    http(status, JSON, spoken(Dialect::OpenaiCompatible, reply, "stop").to_string().as_bytes())
+    http(status, JSON, spoken(WireFormat::OpenaiCompatible, reply, "stop").to_string().as_bytes())
 }
 
 #[test]

@@ -14,7 +14,7 @@ use mirrorstats_vlm::limits::Spend;
 use mirrorstats_vlm::limits::{Account, Limits};
 use mirrorstats_vlm::models::{Backend, Choice, Contract, Model, Prices};
 use mirrorstats_vlm::provider::{Patience, Provider};
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
@@ -36,7 +36,7 @@ pub fn patience() -> Patience {
     }
 }
 
-pub fn choice(dialect: Dialect) -> Choice {
+pub fn choice(wire_format: WireFormat) -> Choice {
     let prices = Prices { input: Some(1.0), cached_input: Some(0.1), output: Some(10.0) };
     Choice {
         name: "Loopback".to_owned(),
@@ -54,7 +54,7 @@ pub fn choice(dialect: Dialect) -> Choice {
             accepted: Vec::new(),
         },
         backend: Backend {
-            dialect,
+            wire_format,
             base_url: None,
             key: "UNUSED".to_owned(),
             plain_http: false,
@@ -77,18 +77,18 @@ impl Bench {
         Self { folder: tempfile::tempdir().unwrap(), network, account }
     }
 
-    pub fn vlm(&self, server: &Server, dialect: Dialect) -> Arc<Vlm> {
-        self.vlm_with(server, dialect, patience())
+    pub fn vlm(&self, server: &Server, wire_format: WireFormat) -> Arc<Vlm> {
+        self.vlm_with(server, wire_format, patience())
     }
 
-    pub fn vlm_with(&self, server: &Server, dialect: Dialect, patience: Patience) -> Arc<Vlm> {
-        self.vlm_of(server, choice(dialect), patience)
+    pub fn vlm_with(&self, server: &Server, wire_format: WireFormat, patience: Patience) -> Arc<Vlm> {
+        self.vlm_of(server, choice(wire_format), patience)
     }
 
     pub fn vlm_of(&self, server: &Server, choice: Choice, patience: Patience) -> Arc<Vlm> {
-        let dialect = choice.backend.dialect;
+        let wire_format = choice.backend.wire_format;
         let secret = Some(Secret::new(KEY.to_owned()));
-        let provider = Provider::new(&server.address, dialect, &choice.model.id, secret, patience, 4).unwrap();
+        let provider = Provider::new(&server.address, wire_format, &choice.model.id, secret, patience, 4).unwrap();
         let (handle, folder) = (self.network.handle().clone(), self.folder.path().to_owned());
         let account = Arc::clone(&self.account);
         Arc::new(Vlm::online(choice, provider, handle, folder, account))

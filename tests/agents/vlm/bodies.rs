@@ -7,14 +7,14 @@ use mirrorstats_agents::prompt::{Prompt, Rendered};
 use mirrorstats_agents::reply;
 use mirrorstats_experiment::{Experiment, built_in_names};
 use mirrorstats_vlm::limits::Limits;
-use mirrorstats_vlm::wire_format::{Dialect, Effort};
+use mirrorstats_vlm::wire_format::{Effort, WireFormat};
 use serde_json::{Value, json};
 
 use super::bench::{Bench, choice, observation, patience, task};
 use super::server::{Server, decision, whole};
 
-const PROVIDERS: [Dialect; 4] =
-    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+const PROVIDERS: [WireFormat; 4] =
+    [WireFormat::OpenaiChat, WireFormat::OpenaiCompatible, WireFormat::Gemini, WireFormat::AnthropicMessages];
 
 /// All names and fixed values of the wire formats, which say nothing about the task.
 const LANGUAGE: [&str; 38] = [
@@ -67,21 +67,21 @@ fn built_in() -> Vec<Experiment> {
 }
 
 /// The body of an episode's first request, and the rendered prompt.
-fn body(dialect: Dialect, experiment: &Experiment) -> (Value, Rendered) {
-    let server = Server::start(move |_, _| whole(dialect, &decision("w")));
+fn body(wire_format: WireFormat, experiment: &Experiment) -> (Value, Rendered) {
+    let server = Server::start(move |_, _| whole(wire_format, &decision("w")));
     let bench = Bench::new(Limits::default());
-    let vlm = bench.vlm(&server, dialect);
+    let vlm = bench.vlm(&server, wire_format);
     Bench::play_task(&vlm, task(experiment.clone()), "episode", 1).remove(0).unwrap();
-    let words = Prompt::of(experiment).unwrap().render(&task(experiment.clone()), &observation(1)).unwrap();
+    let words = Prompt::for_experiment(experiment).unwrap().render(&task(experiment.clone()), &observation(1)).unwrap();
     (server.requests().remove(0).json(), words)
 }
 
 /// The parts of the user's message, in order.
-fn parts(dialect: Dialect, body: &Value) -> &[Value] {
-    let place = match dialect {
-        Dialect::OpenaiChat | Dialect::OpenaiCompatible => "/messages/1/content",
-        Dialect::Gemini => "/contents/0/parts",
-        Dialect::AnthropicMessages => "/messages/0/content",
+fn parts(wire_format: WireFormat, body: &Value) -> &[Value] {
+    let place = match wire_format {
+        WireFormat::OpenaiChat | WireFormat::OpenaiCompatible => "/messages/1/content",
+        WireFormat::Gemini => "/contents/0/parts",
+        WireFormat::AnthropicMessages => "/messages/0/content",
     };
     body.pointer(place).unwrap().as_array().unwrap()
 }
@@ -100,22 +100,22 @@ fn strings(value: &Value) -> Vec<&str> {
 
 #[test]
 fn the_frame_comes_before_the_words_with_every_provider() {
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         for experiment in built_in() {
-            let (body, words) = body(dialect, &experiment);
-            let [image, text] = parts(dialect, &body) else { panic!("{dialect:?}: {body}") };
-            assert_eq!(text["text"], words.user.as_str(), "{dialect:?}");
+            let (body, words) = body(wire_format, &experiment);
+            let [image, text] = parts(wire_format, &body) else { panic!("{wire_format:?}: {body}") };
+            assert_eq!(text["text"], words.user.as_str(), "{wire_format:?}");
             let is_frame = |text: &&str| text.contains("iVBORw0KGgo");
-            assert_eq!(strings(image).iter().filter(|text| is_frame(text)).count(), 1, "{dialect:?}: {image}");
+            assert_eq!(strings(image).iter().filter(|text| is_frame(text)).count(), 1, "{wire_format:?}: {image}");
         }
     }
 }
 
 #[test]
 fn requests_describe_the_task_only_by_the_prompt_and_the_reply_keys() {
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         for experiment in built_in() {
-            let (body, words) = body(dialect, &experiment);
+            let (body, words) = body(wire_format, &experiment);
             let structure = reply::structure(&experiment);
             let keys: BTreeSet<&str> =
                 structure["properties"].as_object().unwrap().keys().map(String::as_str).collect();
@@ -126,17 +126,17 @@ fn requests_describe_the_task_only_by_the_prompt_and_the_reply_keys() {
             said.sort_unstable();
             let mut expected = [words.system.as_str(), &words.user];
             expected.sort_unstable();
-            assert_eq!(said, expected, "{dialect:?}, {experiment:?}");
+            assert_eq!(said, expected, "{wire_format:?}, {experiment:?}");
         }
     }
 }
 
 #[test]
 fn token_limit_and_reasoning_have_each_providers_parameters() {
-    let asked = |dialect: Dialect, id: &str, effort: Option<Effort>| {
-        let server = Server::start(move |_, _| whole(dialect, &decision("w")));
+    let asked = |wire_format: WireFormat, id: &str, effort: Option<Effort>| {
+        let server = Server::start(move |_, _| whole(wire_format, &decision("w")));
         let bench = Bench::new(Limits::default());
-        let mut choice = choice(dialect);
+        let mut choice = choice(wire_format);
         id.clone_into(&mut choice.model.id);
         choice.model.answers_as = vec!["*".to_owned()];
         (choice.model.max_output_tokens, choice.model.reasoning_effort) = (NonZeroU32::new(9_000), effort);
@@ -145,35 +145,39 @@ fn token_limit_and_reasoning_have_each_providers_parameters() {
         (server.requests().remove(0).json(), vlm.description())
     };
     let thinking = "/generationConfig/thinkingConfig";
-    for (dialect, id, most, place, expected) in [
-        (Dialect::OpenaiChat, "m", "/max_completion_tokens", "/reasoning_effort", json!("low")),
-        (Dialect::OpenaiCompatible, "m", "/max_tokens", "/reasoning_effort", json!("low")),
-        (Dialect::AnthropicMessages, "m", "/max_tokens", "/output_config/effort", json!("low")),
+    for (wire_format, id, most, place, expected) in [
+        (WireFormat::OpenaiChat, "m", "/max_completion_tokens", "/reasoning_effort", json!("low")),
+        (WireFormat::OpenaiCompatible, "m", "/max_tokens", "/reasoning_effort", json!("low")),
+        (WireFormat::AnthropicMessages, "m", "/max_tokens", "/output_config/effort", json!("low")),
         (
-            Dialect::Gemini,
+            WireFormat::Gemini,
             "gemini-2.5-pro",
             "/generationConfig/maxOutputTokens",
             thinking,
             json!({ "thinkingBudget": 1_024 }),
         ),
         (
-            Dialect::Gemini,
+            WireFormat::Gemini,
             "gemini-3-pro",
             "/generationConfig/maxOutputTokens",
             thinking,
             json!({ "thinkingLevel": "LOW" }),
         ),
     ] {
-        let (body, description) = asked(dialect, id, Some(Effort::Low));
-        assert_eq!((body.pointer(most), body.pointer(place)), (Some(&json!(9_000)), Some(&expected)), "{dialect:?}");
-        assert!(body.pointer("/output_config/format").is_some() || dialect != Dialect::AnthropicMessages);
+        let (body, description) = asked(wire_format, id, Some(Effort::Low));
+        assert_eq!(
+            (body.pointer(most), body.pointer(place)),
+            (Some(&json!(9_000)), Some(&expected)),
+            "{wire_format:?}"
+        );
+        assert!(body.pointer("/output_config/format").is_some() || wire_format != WireFormat::AnthropicMessages);
         // The recording's sampling includes both.
         assert_eq!(
             (&description["max_output_tokens"], &description["reasoning_effort"]),
             (&json!(9_000), &json!("low"))
         );
-        let (body, description) = asked(dialect, id, None);
-        assert_eq!(body.pointer(place), None, "{dialect:?}");
+        let (body, description) = asked(wire_format, id, None);
+        assert_eq!(body.pointer(place), None, "{wire_format:?}");
         assert_eq!(description.get("reasoning_effort"), None);
     }
 }

@@ -1,6 +1,6 @@
 //! The fingerprint of an episode includes the model that answers.
 
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::Value;
 
 use super::recordings::Folder;
@@ -10,7 +10,7 @@ use crate::harness::traces::{recording, texts};
 
 /// An answer that names a model.
 fn answer(model: &str, action: &str) -> Vec<u8> {
-    let mut body = spoken(Dialect::OpenaiCompatible, &decision(action), "stop");
+    let mut body = spoken(WireFormat::OpenaiCompatible, &decision(action), "stop");
     body["model"] = Value::from(model);
     ok(&body)
 }

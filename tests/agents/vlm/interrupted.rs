@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 
 use super::recordings::{Folder, counting, rows};
 use super::server::{Conduct, Server, whole};
@@ -14,7 +14,7 @@ use crate::harness::program::{stderr, succeeds};
 fn a_signal_before_the_first_whole_episode_loses_no_answer() {
     for (signal, code) in [("-INT", Some(130)), ("-TERM", None)] {
         let server = Server::start(|at, request| {
-            let answer = whole(Dialect::OpenaiCompatible, &counting(request, 12, at));
+            let answer = whole(WireFormat::OpenaiCompatible, &counting(request, 12, at));
             Conduct::dripping(answer, 1 << 20, Duration::from_millis(50))
         });
         let folder = Folder::new();

@@ -7,7 +7,7 @@ use std::process::Output;
 use base64::Engine as _;
 use base64::engine::general_purpose::{STANDARD, URL_SAFE_NO_PAD};
 use mirrorstats_vlm::limits::Limits;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 
 use super::bench::{Bench, KEY};
 use super::recordings::Folder;
@@ -19,11 +19,11 @@ fn keys_are_in_no_file_and_no_message() {
     let echo = format!("{{\"error\": \"your key {KEY} is wrong\"}}");
     let server = Server::start(move |at, _| match at {
         0 => http("500 Internal Server Error", JSON, echo.as_bytes()),
-        1 => whole(Dialect::OpenaiChat, &decision("w").replace("a wall", KEY)),
+        1 => whole(WireFormat::OpenaiChat, &decision("w").replace("a wall", KEY)),
         _ => http("401 Unauthorized", JSON, echo.as_bytes()),
     });
     let bench = Bench::new(Limits::default());
-    let vlm = bench.vlm(&server, Dialect::OpenaiChat);
+    let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
     let replies = Bench::play(&vlm, "episode", 2);
     assert_eq!(replies[0].as_ref().unwrap().words.view_description.as_deref(), Some("[key]"));
     let refused = replies[1].as_ref().unwrap_err();
@@ -84,7 +84,7 @@ fn a_key_echoed_by_the_server_is_not_printed_or_stored() {
     }
     let server = Server::start(|_, request| {
         let echo = decision("done").replace("a wall", &request.head.replace("\r\n", " "));
-        whole(Dialect::OpenaiCompatible, &echo)
+        whole(WireFormat::OpenaiCompatible, &echo)
     });
     check(&server, KEY, "");
     assert_eq!(server.count(), 1);
@@ -101,11 +101,11 @@ fn a_key_in_another_form_is_not_printed_or_stored() {
         let words = decision("done").replace("a wall", form);
         let server = Server::start(move |at, _| match at {
             0 => http("500 Internal Server Error", JSON, echo.as_bytes()),
-            1 => whole(Dialect::OpenaiChat, &words),
+            1 => whole(WireFormat::OpenaiChat, &words),
             _ => http("401 Unauthorized", JSON, echo.as_bytes()),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
+        let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
         let replies = Bench::play(&vlm, "episode", 2);
         let told = format!("{replies:?}{}", bench.written());
         assert!(!told.contains(form) && told.contains("[key]"), "{form}: {told}");
@@ -114,7 +114,7 @@ fn a_key_in_another_form_is_not_printed_or_stored() {
 
 #[test]
 fn a_misplaced_key_is_not_printed() {
-    let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("a")));
+    let server = Server::start(|_, _| whole(WireFormat::OpenaiCompatible, &decision("a")));
     let told = check(&server, KEY, &format!("--base-url http://127.0.0.1/v1?key={KEY}"));
     assert!(told.contains("query"), "{told}");
     let told = check(&server, KEY, &format!("--base-url http://me:{KEY}@127.0.0.1/v1"));
@@ -130,7 +130,7 @@ fn a_misplaced_key_is_not_printed() {
 
 #[test]
 fn a_placeholder_key_leaves_answers_unchanged() {
-    let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done")));
+    let server = Server::start(|_, _| whole(WireFormat::OpenaiCompatible, &decision("done")));
     let folder = Folder::new();
     let mut command = folder.record(&server, "own", "--seeds 1 --runs 1");
     let output = command.env("MIRRORSTATS_API_KEY", "none").output().unwrap();

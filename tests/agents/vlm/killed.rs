@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use mirrorstats_exact::hash;
 use mirrorstats_vlm::journal::Entry;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 
 use super::recordings::{Folder, counting};
 use super::server::{JSON, Request, Server, http, whole};
@@ -26,7 +26,7 @@ fn answer(at: usize, request: &Request) -> Vec<u8> {
         47 => http("429 Too Many Requests", "retry-after: 0\r\n", b"slow down"),
         67 => http("502 Bad Gateway", "retry-after: 0\r\ncontent-type: text/html\r\n", b"<html>"),
         87 => format!("HTTP/1.1 200 OK\r\n{JSON}content-length: 100\r\n\r\nhalf").into_bytes(),
-        _ => whole(Dialect::OpenaiCompatible, &counting(request, STEPS, at)),
+        _ => whole(WireFormat::OpenaiCompatible, &counting(request, STEPS, at)),
     }
 }
 

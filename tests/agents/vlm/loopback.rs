@@ -88,12 +88,12 @@ fn prepare(folder: &Folder, options: &str) -> Vec<Provider> {
     let mut models = String::new();
     let mut study =
         format!("{options}\nmodels = \"models.toml\"\nconfig = \"small.toml\"\nno-log = true\nthreads = 2\n");
-    let servers = SERVED.map(|(server, dialect, path, served)| {
+    let servers = SERVED.map(|(server, wire_format, path, served)| {
         let provider = Provider::start(server);
         let address = &provider.address;
         writeln!(
             models,
-            "[backend.{server}]\ndialect = \"{dialect}\"\nkey = \"LOOPBACK_KEY\"\nbase_url = \"{address}{path}\""
+            "[backend.{server}]\ndialect = \"{wire_format}\"\nkey = \"LOOPBACK_KEY\"\nbase_url = \"{address}{path}\""
         )
         .unwrap();
         for [name, id, keys, own] in served.into_iter().filter(|model| *model != NONE) {

@@ -7,7 +7,7 @@ use mirrorstats_trace::episodes::episode::Action;
 use mirrorstats_vlm::Vlm;
 use mirrorstats_vlm::limits::Limits;
 use mirrorstats_vlm::models::Model;
-use mirrorstats_vlm::wire_format::{Dialect, Effort};
+use mirrorstats_vlm::wire_format::{Effort, WireFormat};
 
 use super::bench::{Bench, choice};
 use super::server::{Server, decision, http, whole};
@@ -16,11 +16,13 @@ use super::server::{Server, decision, http, whole};
 fn answers_are_reused_and_play_without_a_network() {
     let server = Server::start(|at, _| match at {
         1 => http("500 Internal Server Error", "", b""),
-        _ => whole(Dialect::OpenaiChat, &decision(if at % 2 == 0 { "a" } else { "w" })),
+        _ => whole(WireFormat::OpenaiChat, &decision(if at % 2 == 0 { "a" } else { "w" })),
     });
     let bench = Bench::new(Limits::default());
-    let first: Vec<_> =
-        Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 3).into_iter().map(Result::unwrap).collect();
+    let first: Vec<_> = Bench::play(&bench.vlm(&server, WireFormat::OpenaiChat), "episode", 3)
+        .into_iter()
+        .map(Result::unwrap)
+        .collect();
     assert_eq!(server.count(), 4);
     assert_eq!(first[0].action, Some(Action::TurnLeft));
     assert!((first[0].usage.cost_usd.unwrap() - 0.002).abs() < 1e-12);
@@ -30,11 +32,11 @@ fn answers_are_reused_and_play_without_a_network() {
     let mut text = std::fs::read_to_string(&journal).unwrap();
     text.push_str("{\"kind\":\"answer\",\"t\":4,\"att");
     std::fs::write(&journal, text).unwrap();
-    let again = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 3);
+    let again = Bench::play(&bench.vlm(&server, WireFormat::OpenaiChat), "episode", 3);
     assert_eq!(again.into_iter().map(Result::unwrap).collect::<Vec<_>>(), first);
     assert_eq!(server.count(), 4, "nothing is asked again");
 
-    let cassette = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned()));
+    let cassette = Arc::new(Vlm::cassette(choice(WireFormat::OpenaiChat), bench.folder.path().to_owned()));
     let played = Bench::play(&cassette, "episode", 4);
     assert_eq!(played[..3].iter().cloned().map(Result::unwrap).collect::<Vec<_>>(), first);
     assert!(played[3].as_ref().unwrap_err().cause.contains("no answer for step 4"));
@@ -45,7 +47,7 @@ fn answers_are_reused_and_play_without_a_network() {
             model.reasoning_effort = Some(Effort::Low);
         },
     ] {
-        let mut other = choice(Dialect::OpenaiChat);
+        let mut other = choice(WireFormat::OpenaiChat);
         change(&mut other.model);
         let another = Arc::new(Vlm::cassette(other, bench.folder.path().to_owned()));
         let refused = Bench::play(&another, "episode", 1).remove(0).unwrap_err();
@@ -55,11 +57,11 @@ fn answers_are_reused_and_play_without_a_network() {
 
 #[test]
 fn the_model_that_answered_is_kept_as_the_provider_names_it() {
-    for dialect in [Dialect::OpenaiChat, Dialect::Gemini, Dialect::AnthropicMessages] {
-        let server = Server::start(move |_, _| whole(dialect, &decision("w")));
+    for wire_format in [WireFormat::OpenaiChat, WireFormat::Gemini, WireFormat::AnthropicMessages] {
+        let server = Server::start(move |_, _| whole(wire_format, &decision("w")));
         let bench = Bench::new(Limits::default());
-        assert!(Bench::play(&bench.vlm(&server, dialect), "episode", 1)[0].is_ok());
+        assert!(Bench::play(&bench.vlm(&server, wire_format), "episode", 1)[0].is_ok());
         let answer: serde_json::Value = serde_json::from_str(bench.written().lines().nth(1).unwrap()).unwrap();
-        assert_eq!(answer["model"], "model-1-0601", "{dialect:?}");
+        assert_eq!(answer["model"], "model-1-0601", "{wire_format:?}");
     }
 }

@@ -7,7 +7,7 @@ use std::process::Stdio;
 
 use mirrorstats_exact::hash;
 use mirrorstats_vlm::journal::Entry;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 
 use super::recordings::{Folder, counting};
 use super::server::{Request, Server, whole};
@@ -21,7 +21,7 @@ const STEPS: u32 = 3;
 
 /// A server whose answers depend only on the request, so that every recording gets the same ones.
 fn server() -> Server {
-    Server::start(|_, request: &Request| whole(Dialect::OpenaiCompatible, &counting(request, STEPS, 0)))
+    Server::start(|_, request: &Request| whole(WireFormat::OpenaiCompatible, &counting(request, STEPS, 0)))
 }
 
 /// The identity of a question: the frame, and the words hashed like journals do.

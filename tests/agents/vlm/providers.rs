@@ -7,7 +7,7 @@ use mirrorstats_agents::Status;
 use mirrorstats_agents::reply::Repair;
 use mirrorstats_record::fingerprint::Fingerprint;
 use mirrorstats_vlm::limits::Limits;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::{Value, json};
 
 use super::bench::{Bench, KEY, choice, patience};
@@ -16,8 +16,8 @@ use super::server::{JSON, Request, Server, decision, endings, http, ok, spoken, 
 use crate::harness::program::{run, stderr};
 use crate::harness::traces;
 
-const PROVIDERS: [Dialect; 4] =
-    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+const PROVIDERS: [WireFormat; 4] =
+    [WireFormat::OpenaiChat, WireFormat::OpenaiCompatible, WireFormat::Gemini, WireFormat::AnthropicMessages];
 
 /// An error of Gemini: <https://ai.google.dev/gemini-api/docs/rate-limits>, with details as in `google.rpc`.
 fn exhausted(quota: &str, delay: &str) -> Vec<u8> {
@@ -38,15 +38,15 @@ const A_DAY: &str = "GenerateRequestsPerDayPerProjectPerModel";
 
 #[test]
 fn a_whole_answer_counts_whatever_its_content_type_says() {
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         for headers in ["", "content-type: text/plain\r\n", "content-type: text/html; charset=utf-8\r\n"] {
-            let body = spoken(dialect, &decision("w"), endings(dialect).0).to_string();
+            let body = spoken(wire_format, &decision("w"), endings(wire_format).0).to_string();
             let server = Server::start(move |_, _| http("200 OK", headers, body.as_bytes()));
             let bench = Bench::new(Limits::default());
-            let vlm = bench.vlm(&server, dialect);
+            let vlm = bench.vlm(&server, wire_format);
             let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
-            assert_eq!((reply.status, server.count()), (Status::Ok, 1), "{dialect:?} {headers:?}");
-            assert!(reply.usage.cost_usd.is_some_and(|cost| cost > 0.0), "{dialect:?} {headers:?}");
+            assert_eq!((reply.status, server.count()), (Status::Ok, 1), "{wire_format:?} {headers:?}");
+            assert!(reply.usage.cost_usd.is_some_and(|cost| cost > 0.0), "{wire_format:?} {headers:?}");
         }
     }
 }
@@ -55,18 +55,18 @@ fn a_whole_answer_counts_whatever_its_content_type_says() {
 fn waiting_for_a_rate_limit_uses_no_attempts() {
     // OpenAI's client reads `retry-after-ms` before `retry-after`: openai-python, `_base_client.py`.
     let milliseconds = || http("429 Too Many Requests", "retry-after-ms: 20\r\nretry-after: 99\r\n", b"slow down");
-    for (dialect, is_google) in [(Dialect::Gemini, true), (Dialect::OpenaiChat, false)] {
+    for (wire_format, is_google) in [(WireFormat::Gemini, true), (WireFormat::OpenaiChat, false)] {
         let server = Server::start(move |at, _| match at {
             // More failures than attempts.
             0..8 if is_google => exhausted(A_MINUTE, "0.020s"),
             0..8 => milliseconds(),
-            _ => whole(dialect, &decision("w")),
+            _ => whole(wire_format, &decision("w")),
         });
         let bench = Bench::new(Limits::default());
         let start = Instant::now();
-        let reply = Bench::play(&bench.vlm(&server, dialect), "episode", 1).remove(0).unwrap();
-        assert_eq!((reply.status, server.count()), (Status::Ok, 9), "{dialect:?}");
-        assert!(start.elapsed() >= Duration::from_millis(160), "{dialect:?}: asked too early");
+        let reply = Bench::play(&bench.vlm(&server, wire_format), "episode", 1).remove(0).unwrap();
+        assert_eq!((reply.status, server.count()), (Status::Ok, 9), "{wire_format:?}");
+        assert!(start.elapsed() >= Duration::from_millis(160), "{wire_format:?}: asked too early");
     }
 }
 
@@ -77,7 +77,7 @@ fn a_daily_quota_stops_the_recording_with_a_remedy() {
     for answer in answers {
         let server = Server::start(move |_, _| answer.clone());
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::Gemini);
+        let vlm = bench.vlm(&server, WireFormat::Gemini);
         let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
         assert!(lost.contains("quota of the day is used up") && lost.contains("\n  help: "), "{lost}");
         assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
@@ -90,7 +90,7 @@ fn a_wait_of_hours_stops_the_recording_with_a_remedy() {
         let answer = http("429 Too Many Requests", &format!("retry-after: {wait}\r\n"), b"slow down");
         let server = Server::start(move |_, _| answer.clone());
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
+        let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
         let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
         assert!(lost.contains("asks to wait") && lost.contains(seconds) && lost.contains("\n  help: "), "{lost}");
         assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
@@ -102,11 +102,11 @@ fn no_request_goes_out_before_a_used_up_limit_is_renewed() {
     // OpenAI: <https://platform.openai.com/docs/guides/rate-limits>, "Rate limits in headers".
     let headers = "content-type: application/json\r\nx-ratelimit-remaining-requests: 0\r\n\
                    x-ratelimit-reset-requests: 100ms\r\n";
-    let body = spoken(Dialect::OpenaiChat, &decision("w"), "stop").to_string();
+    let body = spoken(WireFormat::OpenaiChat, &decision("w"), "stop").to_string();
     let server = Server::start(move |_, _| http("200 OK", headers, body.as_bytes()));
     let bench = Bench::new(Limits::default());
     let start = Instant::now();
-    let replies = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 3);
+    let replies = Bench::play(&bench.vlm(&server, WireFormat::OpenaiChat), "episode", 3);
     assert!(replies.iter().all(|reply| reply.as_ref().is_ok_and(|reply| reply.status == Status::Ok)));
     assert_eq!(server.count(), 3);
     assert!(start.elapsed() >= Duration::from_millis(200), "the provider was asked too early");
@@ -115,18 +115,18 @@ fn no_request_goes_out_before_a_used_up_limit_is_renewed() {
 #[test]
 fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
     let arguments: Value = serde_json::from_str(&decision("w")).unwrap();
-    for dialect in PROVIDERS {
-        let mut body = spoken(dialect, "", endings(dialect).0);
-        match dialect {
-            Dialect::OpenaiChat | Dialect::OpenaiCompatible => {
+    for wire_format in PROVIDERS {
+        let mut body = spoken(wire_format, "", endings(wire_format).0);
+        match wire_format {
+            WireFormat::OpenaiChat | WireFormat::OpenaiCompatible => {
                 let call = json!({ "type": "function", "function": { "name": "reply", "arguments": decision("w") } });
                 body["choices"][0]["message"] = json!({ "content": null, "tool_calls": [call] });
             }
-            Dialect::Gemini => {
+            WireFormat::Gemini => {
                 let call = json!({ "functionCall": { "name": "reply", "args": arguments } });
                 body["candidates"][0]["content"]["parts"] = json!([call]);
             }
-            Dialect::AnthropicMessages => {
+            WireFormat::AnthropicMessages => {
                 body["content"] = json!([{ "type": "tool_use", "id": "1", "name": "reply", "input": arguments }]);
             }
         }
@@ -134,10 +134,10 @@ fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
         let bench = Bench::new(Limits::default());
         // The second reply comes from the journal.
         for _ in 0..2 {
-            let vlm = bench.vlm(&server, dialect);
+            let vlm = bench.vlm(&server, wire_format);
             let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
-            assert_eq!((reply.status, reply.repairs), (Status::Repaired, vec![Repair::ToolCall]), "{dialect:?}");
-            assert_eq!(reply.self_color.as_deref(), Some("red"), "{dialect:?}");
+            assert_eq!((reply.status, reply.repairs), (Status::Repaired, vec![Repair::ToolCall]), "{wire_format:?}");
+            assert_eq!(reply.self_color.as_deref(), Some("red"), "{wire_format:?}");
         }
         assert_eq!(server.count(), 1);
     }
@@ -164,7 +164,7 @@ fn arguments_as_an_object_and_the_older_form_of_a_call_are_taken() {
         let body = json!({ "choices": [{ "finish_reason": "stop", "message": message }], "usage": usage });
         let server = Server::start(move |_, _| ok(&body));
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
+        let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
         let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
         assert_eq!((reply.status, reply.repairs), (Status::Repaired, repairs), "{shown}");
         assert_eq!((reply.usage.prompt_tokens, reply.usage.completion_tokens), (Some(100), Some(5)), "{shown}");
@@ -180,7 +180,7 @@ fn record(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String
 
 /// An answer of an episode with two steps, by the model with this id.
 fn by(id: &str, request: &Request, at: usize) -> Value {
-    let mut body = spoken(Dialect::Gemini, &counting(request, 2, at), endings(Dialect::Gemini).0);
+    let mut body = spoken(WireFormat::Gemini, &counting(request, 2, at), endings(WireFormat::Gemini).0);
     body["modelVersion"] = id.into();
     body
 }
@@ -285,12 +285,12 @@ fn a_refused_parameter_is_named_with_the_line_that_mends_it() {
             "require_parameters = false",
         ),
     ];
-    for (dialect, status, body, line) in cases {
+    for (wire_format, status, body, line) in cases {
         let answer = http(status, "content-type: application/json\r\n", body.to_string().as_bytes());
         let server = Server::start(move |_, _| answer.clone());
         let folder = Folder::new();
         let own = format!(
-            "[backend.own]\ndialect = \"{dialect}\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
+            "[backend.own]\ndialect = \"{wire_format}\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
              [model.\"Own 1\"]\nbackend = \"own\"\nid = \"own-1\"\n"
         );
         std::fs::write(folder.path().join("own.toml"), own).unwrap();
@@ -298,16 +298,16 @@ fn a_refused_parameter_is_named_with_the_line_that_mends_it() {
         let output = folder.record(&server, "Own 1", words).output().unwrap();
         let said = stderr(&output);
         assert_eq!((output.status.code(), server.count()), (Some(2), 1), "{said}");
-        assert!(said.contains("[model.\"Own 1\"]") && said.contains(line), "{dialect}: {said}");
+        assert!(said.contains("[model.\"Own 1\"]") && said.contains(line), "{wire_format}: {said}");
     }
 }
 
 #[test]
 fn extra_body_is_sent_and_fingerprinted_and_the_default_temperature_is_not_sent() {
-    let asked = |dialect: Dialect, temperature: Option<f64>, extra: Value| {
-        let server = Server::start(move |_, _| ok(&spoken(dialect, &decision("w"), endings(dialect).0)));
+    let asked = |wire_format: WireFormat, temperature: Option<f64>, extra: Value| {
+        let server = Server::start(move |_, _| ok(&spoken(wire_format, &decision("w"), endings(wire_format).0)));
         let bench = Bench::new(Limits::default());
-        let mut choice = choice(dialect);
+        let mut choice = choice(wire_format);
         choice.model.temperature = temperature;
         choice.model.extra_body = extra.as_object().unwrap().clone();
         let vlm = bench.vlm_of(&server, choice, patience());
@@ -315,59 +315,59 @@ fn extra_body_is_sent_and_fingerprinted_and_the_default_temperature_is_not_sent(
         let recording = json!({ "agent": vlm.description() });
         (
             server.requests().remove(0).json(),
-            Fingerprint::of(&recording, None, None).parts["sampling"].clone(),
+            Fingerprint::new(&recording, None, None).parts["sampling"].clone(),
             recording,
         )
     };
-    for dialect in PROVIDERS {
-        let place = if dialect == Dialect::Gemini { "/generationConfig/temperature" } else { "/temperature" };
-        let (plain, paper, _) = asked(dialect, Some(0.2), json!({}));
-        assert_eq!(plain.pointer(place), Some(&json!(0.2)), "{dialect:?}");
+    for wire_format in PROVIDERS {
+        let place = if wire_format == WireFormat::Gemini { "/generationConfig/temperature" } else { "/temperature" };
+        let (plain, paper, _) = asked(wire_format, Some(0.2), json!({}));
+        assert_eq!(plain.pointer(place), Some(&json!(0.2)), "{wire_format:?}");
         let extra =
             json!({ "service_tier": "flex", "generationConfig": { "mediaResolution": "MEDIA_RESOLUTION_HIGH" } });
-        let (body, other, recording) = asked(dialect, None, extra.clone());
-        assert_eq!((body.pointer(place), &body["service_tier"]), (None, &json!("flex")), "{dialect:?}");
+        let (body, other, recording) = asked(wire_format, None, extra.clone());
+        assert_eq!((body.pointer(place), &body["service_tier"]), (None, &json!("flex")), "{wire_format:?}");
         assert_eq!(body["generationConfig"]["mediaResolution"], "MEDIA_RESOLUTION_HIGH");
-        assert_eq!(body["generationConfig"].get("maxOutputTokens").is_some(), dialect == Dialect::Gemini);
+        assert_eq!(body["generationConfig"].get("maxOutputTokens").is_some(), wire_format == WireFormat::Gemini);
         assert_eq!(
             (&recording["agent"]["temperature"], &recording["agent"]["extra_body"]),
             (&json!("default"), &extra)
         );
-        assert_ne!(paper, other, "{dialect:?}");
+        assert_ne!(paper, other, "{wire_format:?}");
     }
 }
 
 #[test]
 fn tokens_from_a_cache_have_their_price_with_every_provider() {
-    for dialect in PROVIDERS {
-        let mut body = spoken(dialect, &decision("w"), endings(dialect).0);
+    for wire_format in PROVIDERS {
+        let mut body = spoken(wire_format, &decision("w"), endings(wire_format).0);
         // 1000 tokens per request, 400 of them cached; 100 per reply.
-        match dialect {
+        match wire_format {
             // <https://platform.openai.com/docs/guides/prompt-caching>; OpenRouter's accounting has the same name.
-            Dialect::OpenaiChat | Dialect::OpenaiCompatible => {
+            WireFormat::OpenaiChat | WireFormat::OpenaiCompatible => {
                 body["usage"]["prompt_tokens_details"] = json!({ "cached_tokens": 400 });
             }
             // <https://ai.google.dev/gemini-api/docs/caching>: `promptTokenCount` includes the cached tokens.
-            Dialect::Gemini => body["usageMetadata"]["cachedContentTokenCount"] = json!(400),
+            WireFormat::Gemini => body["usageMetadata"]["cachedContentTokenCount"] = json!(400),
             // <https://platform.claude.com/docs/en/build-with-claude/prompt-caching>: `input_tokens` excludes them.
-            Dialect::AnthropicMessages => {
+            WireFormat::AnthropicMessages => {
                 body["usage"]["input_tokens"] = json!(600);
                 body["usage"]["cache_read_input_tokens"] = json!(400);
             }
         }
         let server = Server::start(move |_, _| ok(&body));
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, dialect);
+        let vlm = bench.vlm(&server, wire_format);
         let usage = Bench::play(&vlm, "episode", 1).remove(0).unwrap().usage;
-        assert_eq!(usage.prompt_tokens, Some(1_000), "{dialect:?}");
+        assert_eq!(usage.prompt_tokens, Some(1_000), "{wire_format:?}");
         // The bench's prices per million tokens: 1 dollar, cached 0.1, replies 10.
-        assert!((usage.cost_usd.unwrap() - (600.0 + 40.0 + 1_000.0) / 1e6).abs() < 1e-12, "{dialect:?}: {usage:?}");
+        assert!((usage.cost_usd.unwrap() - (600.0 + 40.0 + 1_000.0) / 1e6).abs() < 1e-12, "{wire_format:?}: {usage:?}");
     }
 }
 
 #[test]
 fn an_id_that_no_file_has_is_recorded_with_a_warning() {
-    let server = Server::start(|at, request| ok(&spoken(Dialect::OpenaiChat, &counting(request, 2, at), "stop")));
+    let server = Server::start(|at, request| ok(&spoken(WireFormat::OpenaiChat, &counting(request, 2, at), "stop")));
     let folder = Folder::new();
     let words = "--backend openai --seeds 1 --runs 1 --accept-model model-1-0601";
     let output =

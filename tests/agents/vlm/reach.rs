@@ -4,7 +4,7 @@ use std::net::TcpListener;
 
 use mirrorstats_agents::LostKind;
 use mirrorstats_vlm::limits::Limits;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::json;
 
 use super::bench::{Bench, KEY};
@@ -28,7 +28,7 @@ fn recorded(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, Stri
 #[test]
 fn an_unreachable_address_is_reported_before_recording() {
     let folder = Folder::new();
-    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 1, at)));
+    let server = Server::start(|at, request| whole(WireFormat::OpenaiCompatible, &counting(request, 1, at)));
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let words = format!("--seeds 1 --runs 2 --base-url http://127.0.0.1:{port}/v1");
     let (code, said) = recorded(&folder, &server, &words);
@@ -66,11 +66,11 @@ fn a_server_that_takes_no_images_ends_the_recording_with_its_first_answer() {
 #[test]
 fn refused_images_are_a_failure_not_an_outage() {
     let server = Server::start(|at, _| match at {
-        0 => whole(Dialect::OpenaiChat, &decision("w")),
+        0 => whole(WireFormat::OpenaiChat, &decision("w")),
         _ => http("500 Internal Server Error", JSON, br#"{"error":"this model does not support images"}"#),
     });
     let bench = Bench::new(Limits::default());
-    let vlm = bench.vlm(&server, Dialect::OpenaiChat);
+    let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
     let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err();
     assert!(lost.cause.contains("takes no images") && lost.kind == LostKind::Failure, "{lost}");
     assert_eq!((vlm.stopped(), server.count()), (Some(lost.cause.as_str()), 2));

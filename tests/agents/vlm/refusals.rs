@@ -5,7 +5,7 @@ use std::fs;
 use mirrorstats_agents::{Lost, Reply, Status};
 use mirrorstats_vlm::Vlm;
 use mirrorstats_vlm::limits::Limits;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::{Value, json};
 
 use super::bench::{Bench, KEY, choice};
@@ -13,8 +13,8 @@ use super::recordings::{Folder, counting, rows};
 use super::server::{JSON, Server, decision, http, ok, whole};
 use crate::harness::program::stderr;
 
-const PROVIDERS: [Dialect; 4] =
-    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+const PROVIDERS: [WireFormat; 4] =
+    [WireFormat::OpenaiChat, WireFormat::OpenaiCompatible, WireFormat::Gemini, WireFormat::AnthropicMessages];
 const TOO_LONG: &str = "This model's maximum context length is 8192 tokens";
 
 fn bad_request(error: &Value) -> Vec<u8> {
@@ -22,16 +22,16 @@ fn bad_request(error: &Value) -> Vec<u8> {
 }
 
 /// The error with which a provider refuses a request because of its content.
-fn refusal(dialect: Dialect) -> Value {
-    match dialect {
-        Dialect::OpenaiChat => json!({ "error": { "message": "filtered", "type": null, "code": "content_filter",
+fn refusal(wire_format: WireFormat) -> Value {
+    match wire_format {
+        WireFormat::OpenaiChat => json!({ "error": { "message": "filtered", "type": null, "code": "content_filter",
             "status": 400, "innererror": { "code": "ResponsibleAIPolicyViolation" } } }),
-        Dialect::OpenaiCompatible => {
+        WireFormat::OpenaiCompatible => {
             json!({ "error": { "message": "against the rules", "type": "invalid_request_error",
             "code": "content_policy_violation" } })
         }
-        Dialect::Gemini => json!({ "promptFeedback": { "blockReason": "PROHIBITED_CONTENT" }, "usageMetadata": {} }),
-        Dialect::AnthropicMessages => json!({ "type": "error", "error": { "type": "invalid_request_error",
+        WireFormat::Gemini => json!({ "promptFeedback": { "blockReason": "PROHIBITED_CONTENT" }, "usageMetadata": {} }),
+        WireFormat::AnthropicMessages => json!({ "type": "error", "error": { "type": "invalid_request_error",
             "message": "Output blocked by content filtering policy" } }),
     }
 }
@@ -47,24 +47,24 @@ fn statuses(replies: &[Result<Reply, Lost>]) -> Vec<Status> {
 
 #[test]
 fn a_bad_request_that_refuses_costs_one_step_and_replays() {
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         let server = Server::start(move |at, _| match at {
-            1 => bad_request(&refusal(dialect)),
-            _ => whole(dialect, &decision("w")),
+            1 => bad_request(&refusal(wire_format)),
+            _ => whole(wire_format, &decision("w")),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, dialect);
+        let vlm = bench.vlm(&server, wire_format);
         let replies = Bench::play(&vlm, "episode", 3);
-        assert_eq!(statuses(&replies), [Status::Ok, Status::Refusal, Status::Ok], "{dialect:?}");
-        assert_eq!((server.count(), vlm.stopped()), (3, None), "{dialect:?}");
+        assert_eq!(statuses(&replies), [Status::Ok, Status::Refusal, Status::Ok], "{wire_format:?}");
+        assert_eq!((server.count(), vlm.stopped()), (3, None), "{wire_format:?}");
         let refused = replies[1].as_ref().unwrap();
         assert_eq!((refused.action, &refused.self_color, refused.usage.cost_usd), (None, &None, None));
 
-        let again = Bench::play(&bench.vlm(&server, dialect), "episode", 3);
-        let cassette = Vlm::cassette(choice(dialect), bench.folder.path().to_owned());
-        assert_eq!(again, replies, "{dialect:?}");
-        assert_eq!(Bench::play(&cassette.into(), "episode", 3), replies, "{dialect:?}");
-        assert_eq!(server.count(), 3, "a refusal is not asked for again: {dialect:?}");
+        let again = Bench::play(&bench.vlm(&server, wire_format), "episode", 3);
+        let cassette = Vlm::cassette(choice(wire_format), bench.folder.path().to_owned());
+        assert_eq!(again, replies, "{wire_format:?}");
+        assert_eq!(Bench::play(&cassette.into(), "episode", 3), replies, "{wire_format:?}");
+        assert_eq!(server.count(), 3, "a refusal is not asked for again: {wire_format:?}");
     }
 }
 
@@ -75,22 +75,26 @@ fn refusals_are_known_in_all_their_forms() {
     let flagged = json!({ "error": { "code": 403, "message": "flagged",
         "metadata": { "reasons": ["violence"], "flagged_input": "...", "provider_name": "OpenAI" } } });
     let cases = [
-        ("an error with 200", Dialect::OpenaiChat, ok(&refusal(Dialect::OpenaiChat))),
-        ("an end with 400", Dialect::AnthropicMessages, bad_request(&json!({ "stop_reason": "refusal" }))),
-        ("an end with 200", Dialect::AnthropicMessages, ok(&json!({ "content": [], "stop_reason": "refusal" }))),
-        ("a blocked prompt with 200", Dialect::Gemini, ok(&json!({ "promptFeedback": { "blockReason": "SAFETY" } }))),
+        ("an error with 200", WireFormat::OpenaiChat, ok(&refusal(WireFormat::OpenaiChat))),
+        ("an end with 400", WireFormat::AnthropicMessages, bad_request(&json!({ "stop_reason": "refusal" }))),
+        ("an end with 200", WireFormat::AnthropicMessages, ok(&json!({ "content": [], "stop_reason": "refusal" }))),
+        (
+            "a blocked prompt with 200",
+            WireFormat::Gemini,
+            ok(&json!({ "promptFeedback": { "blockReason": "SAFETY" } })),
+        ),
         (
             "a candidate with 400",
-            Dialect::Gemini,
+            WireFormat::Gemini,
             bad_request(&json!({ "candidates": [{ "finishReason": "SAFETY" }] })),
         ),
-        ("an error with 400", Dialect::Gemini, bad_request(&google)),
-        ("a moderator", Dialect::OpenaiCompatible, http("403 Forbidden", JSON, flagged.to_string().as_bytes())),
+        ("an error with 400", WireFormat::Gemini, bad_request(&google)),
+        ("a moderator", WireFormat::OpenaiCompatible, http("403 Forbidden", JSON, flagged.to_string().as_bytes())),
     ];
-    for (name, dialect, answer) in cases {
+    for (name, wire_format, answer) in cases {
         let server = Server::start(move |_, _| answer.clone());
         let bench = Bench::new(Limits::default());
-        let replies = Bench::play(&bench.vlm(&server, dialect), "episode", 1);
+        let replies = Bench::play(&bench.vlm(&server, wire_format), "episode", 1);
         assert_eq!(replies[0].as_ref().map(|reply| reply.status), Ok(Status::Refusal), "{name}");
         assert_eq!(server.count(), 1, "{name}");
     }
@@ -98,25 +102,25 @@ fn refusals_are_known_in_all_their_forms() {
 
 #[test]
 fn a_bad_request_after_an_answer_costs_its_episode_alone() {
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         let server = Server::start(move |at, _| match at {
             1 | 3 => too_long(),
-            _ => whole(dialect, &decision("w")),
+            _ => whole(wire_format, &decision("w")),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, dialect);
+        let vlm = bench.vlm(&server, wire_format);
         let lost = Bench::play(&vlm, "long", 2).remove(1).unwrap_err();
         assert_eq!(lost.status, None);
         assert!(lost.cause.starts_with("step 2: the provider rejects this request: HTTP 400"), "{lost}");
         assert!(lost.cause.contains(TOO_LONG), "{lost}");
-        assert_eq!(vlm.stopped(), None, "{dialect:?}");
-        assert_eq!(statuses(&Bench::play(&vlm, "short", 1)), [Status::Ok], "{dialect:?}");
+        assert_eq!(vlm.stopped(), None, "{wire_format:?}");
+        assert_eq!(statuses(&Bench::play(&vlm, "short", 1)), [Status::Ok], "{wire_format:?}");
 
         // A restart knows from the journal that the model has answered.
-        let again = bench.vlm(&server, dialect);
+        let again = bench.vlm(&server, wire_format);
         let replies = Bench::play(&again, "long", 2);
-        assert!(replies[0].is_ok() && replies[1].is_err(), "{dialect:?}");
-        assert_eq!((server.count(), again.stopped()), (4, None), "{dialect:?}");
+        assert!(replies[0].is_ok() && replies[1].is_err(), "{wire_format:?}");
+        assert_eq!((server.count(), again.stopped()), (4, None), "{wire_format:?}");
     }
 }
 
@@ -124,11 +128,11 @@ fn a_bad_request_after_an_answer_costs_its_episode_alone() {
 fn a_key_or_a_model_that_is_refused_stops_everything_at_any_time() {
     for status in ["401 Unauthorized", "403 Forbidden", "404 Not Found"] {
         let server = Server::start(move |at, _| match at {
-            0 => whole(Dialect::OpenaiChat, &decision("w")),
+            0 => whole(WireFormat::OpenaiChat, &decision("w")),
             _ => http(status, JSON, br#"{"error": {"message": "no", "code": "denied"}}"#),
         });
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm(&server, Dialect::OpenaiChat);
+        let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
         let lost = Bench::play(&vlm, "episode", 3).remove(2).unwrap_err();
         assert!(lost.cause.starts_with(&format!("the provider refuses the request: HTTP {status}")), "{lost}");
         assert_eq!((vlm.stopped(), server.count()), (Some(lost.cause.as_str()), 2));
@@ -141,13 +145,13 @@ const TWENTY: &str = "--seeds 4 --runs 5 --threads 1 --in-flight 1 --json";
 /// A server that gives `answer` to request number `special`, from 0; the other requests end their episodes at step 2.
 fn server(special: usize, answer: Vec<u8>) -> Server {
     Server::start(move |at, request| {
-        if at == special { answer.clone() } else { whole(Dialect::OpenaiCompatible, &counting(request, 2, at)) }
+        if at == special { answer.clone() } else { whole(WireFormat::OpenaiCompatible, &counting(request, 2, at)) }
     })
 }
 
 #[test]
 fn one_refusal_in_a_recording_costs_one_step() {
-    let server = server(3, bad_request(&refusal(Dialect::OpenaiChat)));
+    let server = server(3, bad_request(&refusal(WireFormat::OpenaiChat)));
     let folder = Folder::new();
     let output = folder.record(&server, "own", TWENTY).output().unwrap();
     let said = stderr(&output);
@@ -193,7 +197,7 @@ fn one_request_that_is_too_long_costs_one_episode() {
 #[test]
 fn a_continued_recording_remembers_that_the_model_answered() {
     let folder = Folder::new();
-    let first = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 1, at)));
+    let first = Server::start(|at, request| whole(WireFormat::OpenaiCompatible, &counting(request, 1, at)));
     let output = folder.record(&first, "own", "--seeds 1 --runs 1").output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     // The second start's first request is rejected, the others are not.

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::{Value, json};
 
 pub const JSON: &str = "content-type: application/json\r\n";
@@ -145,21 +145,21 @@ pub fn decision(action: &str) -> String {
 }
 
 /// The body of an answer in the provider's wire format; `ending` is its word for how the text ended.
-pub fn spoken(dialect: Dialect, text: &str, ending: &str) -> Value {
-    match dialect {
-        Dialect::OpenaiChat | Dialect::OpenaiCompatible => json!({
+pub fn spoken(wire_format: WireFormat, text: &str, ending: &str) -> Value {
+    match wire_format {
+        WireFormat::OpenaiChat | WireFormat::OpenaiCompatible => json!({
             "id": "1", "object": "chat.completion", "model": "model-1-0601",
             "choices": [{ "index": 0, "finish_reason": ending, "message": { "role": "assistant", "content": text } }],
             "usage": { "prompt_tokens": 1000, "completion_tokens": 100 },
         }),
-        Dialect::Gemini => json!({
+        WireFormat::Gemini => json!({
             "candidates": [{ "finishReason": ending, "content": { "role": "model", "parts": [
                 { "text": "hm", "thought": true }, { "text": text },
             ] } }],
             "modelVersion": "model-1-0601",
             "usageMetadata": { "promptTokenCount": 1000, "candidatesTokenCount": 60, "thoughtsTokenCount": 40 },
         }),
-        Dialect::AnthropicMessages => json!({
+        WireFormat::AnthropicMessages => json!({
             "id": "1", "type": "message", "role": "assistant", "model": "model-1-0601",
             "content": [{ "type": "text", "text": text }], "stop_reason": ending,
             "usage": { "input_tokens": 1000, "output_tokens": 100 },
@@ -168,15 +168,15 @@ pub fn spoken(dialect: Dialect, text: &str, ending: &str) -> Value {
 }
 
 /// A whole answer in the provider's wire format.
-pub fn whole(dialect: Dialect, text: &str) -> Vec<u8> {
-    ok(&spoken(dialect, text, endings(dialect).0))
+pub fn whole(wire_format: WireFormat, text: &str) -> Vec<u8> {
+    ok(&spoken(wire_format, text, endings(wire_format).0))
 }
 
 /// The provider's words for a normal end, and for an end by the token limit.
-pub const fn endings(dialect: Dialect) -> (&'static str, &'static str) {
-    match dialect {
-        Dialect::OpenaiChat | Dialect::OpenaiCompatible => ("stop", "length"),
-        Dialect::Gemini => ("STOP", "MAX_TOKENS"),
-        Dialect::AnthropicMessages => ("end_turn", "max_tokens"),
+pub const fn endings(wire_format: WireFormat) -> (&'static str, &'static str) {
+    match wire_format {
+        WireFormat::OpenaiChat | WireFormat::OpenaiCompatible => ("stop", "length"),
+        WireFormat::Gemini => ("STOP", "MAX_TOKENS"),
+        WireFormat::AnthropicMessages => ("end_turn", "max_tokens"),
     }
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use mirrorstats_agents::LostKind;
 use mirrorstats_vlm::limits::Limits;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 
 use serde_json::{Value, json};
 
@@ -16,9 +16,9 @@ use crate::harness::program::stderr;
 
 #[test]
 fn limits_stop_before_the_request_over_them() {
-    let server = Server::start(|_, _| whole(Dialect::OpenaiChat, &decision("w")));
+    let server = Server::start(|_, _| whole(WireFormat::OpenaiChat, &decision("w")));
     let bench = Bench::new(Limits { requests: Some(2), ..Limits::default() });
-    let vlm = bench.vlm(&server, Dialect::OpenaiChat);
+    let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
     let replies = Bench::play(&vlm, "episode", 3);
     assert!(replies[0].is_ok() && replies[1].is_ok());
     let stopped = replies[2].as_ref().unwrap_err();
@@ -52,7 +52,7 @@ fn limits_include_the_spending_of_earlier_starts() {
         ),
     ];
     for (limit, reason, requests) in cases {
-        let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+        let server = Server::start(|at, request| whole(WireFormat::OpenaiCompatible, &counting(request, 4, at)));
         let folder = Folder::new();
         std::fs::write(folder.path().join("own.toml"), own).unwrap();
         for start in 1..=2 {
@@ -70,7 +70,7 @@ fn limits_include_the_spending_of_earlier_starts() {
 
 #[test]
 fn an_episode_that_a_limit_stopped_is_not_lost() {
-    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+    let server = Server::start(|at, request| whole(WireFormat::OpenaiCompatible, &counting(request, 4, at)));
     let folder = Folder::new();
     let words = "--seeds 1 --runs 4 --threads 1 --in-flight 1 --json";
     let output = folder.record(&server, "own", &format!("{words} --max-requests 10")).output().unwrap();
@@ -102,7 +102,7 @@ fn an_episode_that_a_limit_stopped_is_not_lost() {
 #[test]
 fn models_that_share_a_folder_have_accounts_of_their_own() {
     let folder = Folder::new();
-    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+    let server = Server::start(|at, request| whole(WireFormat::OpenaiCompatible, &counting(request, 4, at)));
     let model = |name: &str, price: f64| {
         format!(
             "[model.\"{name}\"]\nbackend = \"compatible\"\nid = \"{name}\"\nanswers_as = [\"model-1-*\"]\n\
@@ -140,7 +140,7 @@ fn a_limit_of_cost_without_prices_is_refused_before_anything_is_sent_or_made() {
         ("prices = { output = 1.0 }\n", "`own` has no input price"),
     ];
     for (prices, reason) in cases {
-        let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done")));
+        let server = Server::start(|_, _| whole(WireFormat::OpenaiCompatible, &decision("done")));
         let folder = Folder::new();
         std::fs::write(folder.path().join("own.toml"), format!("{own}{prices}")).unwrap();
         let (code, said) = started(&folder, &server, "--max-cost 1");
@@ -151,7 +151,8 @@ fn a_limit_of_cost_without_prices_is_refused_before_anything_is_sent_or_made() {
         let (code, said) = started(&folder, &server, "--max-requests 200");
         assert_eq!(code, Some(0), "{said}");
     }
-    let (server, folder) = (Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done"))), Folder::new());
+    let (server, folder) =
+        (Server::start(|_, _| whole(WireFormat::OpenaiCompatible, &decision("done"))), Folder::new());
     let output = folder.record(&server, "unknown-model", "--max-cost 1").output().unwrap();
     assert_eq!((output.status.code(), server.count()), (Some(2), 0), "{}", stderr(&output));
     assert!(stderr(&output).contains("`unknown-model` has no input and no output price"), "{}", stderr(&output));
@@ -159,7 +160,8 @@ fn a_limit_of_cost_without_prices_is_refused_before_anything_is_sent_or_made() {
 
 #[test]
 fn a_limit_of_cost_is_an_amount() {
-    let (server, folder) = (Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done"))), Folder::new());
+    let (server, folder) =
+        (Server::start(|_, _| whole(WireFormat::OpenaiCompatible, &decision("done"))), Folder::new());
     for limit in ["nan", "inf", "-1", "much"] {
         let output = folder.record(&server, "own", &format!("--max-cost={limit}")).output().unwrap();
         assert_eq!((output.status.code(), server.count()), (Some(2), 0), "{limit}: {}", stderr(&output));
@@ -180,7 +182,7 @@ fn priced(folder: &Folder, server: &Server, words: &str) -> Command {
 fn slow_server() -> Server {
     Server::start(|at, request| {
         std::thread::sleep(Duration::from_millis(30));
-        whole(Dialect::OpenaiCompatible, &counting(request, 6, at))
+        whole(WireFormat::OpenaiCompatible, &counting(request, 6, at))
     })
 }
 
@@ -221,7 +223,7 @@ fn the_spending_of_a_killed_recording_counts() {
 fn timed_out_and_killed_requests_count_with_their_largest_cost() {
     let server = Server::start(|at, request| match at {
         0 => Conduct::dripping(vec![b' '], 1, Duration::from_secs(5)),
-        _ => whole(Dialect::OpenaiCompatible, &counting(request, 4, at)).into(),
+        _ => whole(WireFormat::OpenaiCompatible, &counting(request, 4, at)).into(),
     });
     let folder = Folder::new();
     let output = priced(&folder, &server, "--timeout 1 --max-requests 1 --attempts 1").output().unwrap();
@@ -252,7 +254,7 @@ fn routed(folder: &Folder, server: &Server, words: &str) -> Command {
 
 /// <https://openrouter.ai/docs/use-cases/usage-accounting>: `usage.cost`.
 fn with_cost(text: &str, cost: f64) -> Vec<u8> {
-    let mut body = spoken(Dialect::OpenaiCompatible, text, "stop");
+    let mut body = spoken(WireFormat::OpenaiCompatible, text, "stop");
     body["usage"]["cost"] = json!(cost);
     ok(&body)
 }
@@ -273,7 +275,7 @@ fn a_cost_limit_uses_the_costs_that_answers_state() {
     assert!(answer["recorded"].as_u64().unwrap() >= 6, "{answer}");
 
     // A router that states no cost is noticed at its first answer.
-    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 6, at)));
+    let server = Server::start(|at, request| whole(WireFormat::OpenaiCompatible, &counting(request, 6, at)));
     let folder = Folder::new();
     let output = routed(&folder, &server, "--seeds 4 --runs 4 --max-cost 0.1").output().unwrap();
     assert_eq!((output.status.code(), server.count()), (Some(2), 1), "{}", stderr(&output));
@@ -305,7 +307,7 @@ fn a_forecast_follows_the_episodes_that_are_finished() {
 
 #[test]
 fn requests_per_minute_stay_within_the_limit_of_the_account() {
-    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+    let server = Server::start(|at, request| whole(WireFormat::OpenaiCompatible, &counting(request, 4, at)));
     let folder = Folder::new();
     let start = Instant::now();
     // One request per 50 ms.

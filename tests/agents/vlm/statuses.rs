@@ -6,25 +6,25 @@ use mirrorstats_agents::Status;
 use mirrorstats_agents::reply::Repair;
 use mirrorstats_vlm::limits::Limits;
 use mirrorstats_vlm::provider::Patience;
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::json;
 
 use super::bench::{Bench, KEY, patience};
 use super::server::{Conduct, JSON, Server, decision, endings, http, ok, spoken, whole};
 
-const PROVIDERS: [Dialect; 4] =
-    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+const PROVIDERS: [WireFormat; 4] =
+    [WireFormat::OpenaiChat, WireFormat::OpenaiCompatible, WireFormat::Gemini, WireFormat::AnthropicMessages];
 
 /// A name, the answer, and the status of the step.
 type Case = (&'static str, Vec<u8>, Status);
 
 /// Checks that each case ends in its status for this provider, after the number of attempts for that status.
-fn check(dialect: Dialect, cases: Vec<Case>) {
+fn check(wire_format: WireFormat, cases: Vec<Case>) {
     let bench = Bench::new(Limits::default());
     for (name, answer, status) in cases {
         let server = Server::start(move |_, _| answer.clone());
-        let vlm = bench.vlm(&server, dialect);
-        let place = format!("{name}, {dialect:?}");
+        let vlm = bench.vlm(&server, wire_format);
+        let place = format!("{name}, {wire_format:?}");
         let reply = Bench::play(&vlm, &place.replace([' ', ','], "-"), 1).remove(0);
         let is_outage = matches!(status, Status::ServerError | Status::Timeout);
         if is_outage || status == Status::RateLimited {
@@ -50,12 +50,12 @@ fn check(dialect: Dialect, cases: Vec<Case>) {
 
 #[test]
 fn replies_end_in_their_status_with_every_provider() {
-    for dialect in PROVIDERS {
-        let (stop, length) = endings(dialect);
-        let text = |text: &str| ok(&spoken(dialect, text, stop));
+    for wire_format in PROVIDERS {
+        let (stop, length) = endings(wire_format);
+        let text = |text: &str| ok(&spoken(wire_format, text, stop));
         let twice = decision("w").replacen('{', "{\"action\":\"s\",", 1);
         check(
-            dialect,
+            wire_format,
             vec![
                 ("valid", text(&decision("w")), Status::Ok),
                 ("fenced", text(&format!("```json\n{}\n```", decision("w"))), Status::Repaired),
@@ -64,10 +64,10 @@ fn replies_end_in_their_status_with_every_provider() {
                 ("deep objects", text(&"{\"action\":".repeat(5_000)), Status::ParseFailed),
                 ("a key twice", text(&twice), Status::SchemaInvalid),
                 ("another action", text(&decision("jump")), Status::SchemaInvalid),
-                ("cut off", ok(&spoken(dialect, &decision("w")[..20], length)), Status::Truncated),
+                ("cut off", ok(&spoken(wire_format, &decision("w")[..20], length)), Status::Truncated),
                 (
                     "white space up to the limit",
-                    ok(&spoken(dialect, &format!("{}\n\n\n", decision("w")), length)),
+                    ok(&spoken(wire_format, &format!("{}\n\n\n", decision("w")), length)),
                     Status::Ok,
                 ),
                 ("no text", text(""), Status::Empty),
@@ -79,33 +79,34 @@ fn replies_end_in_their_status_with_every_provider() {
 
 #[test]
 fn a_lone_surrogate_in_an_answer_is_a_repair_with_every_provider() {
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         // An escape in the answer's body or in the reply within, and the text that it becomes.
         for (escape, text) in [(r"\ud83d", "\u{fffd}"), (r"\\ud83d", "\u{fffd}"), (r"\ud83d\ude00", "\u{1f600}")] {
-            let body = spoken(dialect, &decision("w").replace("a wall", "HERE"), endings(dialect).0).to_string();
+            let body =
+                spoken(wire_format, &decision("w").replace("a wall", "HERE"), endings(wire_format).0).to_string();
             let answer = http("200 OK", JSON, body.replace("HERE", escape).as_bytes());
             let bench = Bench::new(Limits::default());
             let server = Server::start(move |_, _| answer.clone());
-            let vlm = bench.vlm(&server, dialect);
+            let vlm = bench.vlm(&server, wire_format);
             // The second reply comes from the journal.
             for _ in 0..2 {
                 let reply = Bench::play(&vlm, "E1-m-s1-r1", 1).remove(0).unwrap();
                 let is_pair = text != "\u{fffd}";
                 let expected =
                     if is_pair { (Status::Ok, None) } else { (Status::Repaired, Some("surrogate".to_owned())) };
-                assert_eq!((reply.status, Repair::joined(&reply.repairs)), expected, "{escape}, {dialect:?}");
-                assert_eq!(reply.words.view_description.as_deref(), Some(text), "{escape}, {dialect:?}");
+                assert_eq!((reply.status, Repair::joined(&reply.repairs)), expected, "{escape}, {wire_format:?}");
+                assert_eq!(reply.words.view_description.as_deref(), Some(text), "{escape}, {wire_format:?}");
                 assert_eq!(reply.self_color.as_deref(), Some("red"));
             }
-            assert_eq!(server.count(), 1, "{escape}, {dialect:?}");
+            assert_eq!(server.count(), 1, "{escape}, {wire_format:?}");
         }
     }
 }
 
 #[test]
 fn failures_of_the_server_end_in_their_status_with_every_provider() {
-    for dialect in PROVIDERS {
-        let fine = whole(dialect, &decision("w"));
+    for wire_format in PROVIDERS {
+        let fine = whole(wire_format, &decision("w"));
         let page = b"<html><body>Bad gateway</body></html>";
         let deep = format!("{{\"x\":{}{}}}", "[".repeat(5_000), "]".repeat(5_000));
         let huge = vec![b' '; 200_000];
@@ -113,7 +114,7 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
         let overloaded = br#"{"error": {"message": "The model is overloaded. Please try again later."}}"#;
         let too_many = |headers: &str| http("429 Too Many Requests", headers, b"slow down");
         check(
-            dialect,
+            wire_format,
             vec![
                 ("429 alone", too_many(""), Status::RateLimited),
                 ("429 with seconds", too_many("retry-after: 0\r\n"), Status::RateLimited),
@@ -159,17 +160,17 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
 fn refusals_and_empty_answers_have_each_providers_own_form() {
     let openai = |choice| ok(&json!({ "choices": [choice], "usage": {} }));
     check(
-        Dialect::OpenaiChat,
+        WireFormat::OpenaiChat,
         vec![
             (
                 "a refusal",
                 openai(json!({ "finish_reason": "stop", "message": { "content": null, "refusal": "I can't." } })),
                 Status::Refusal,
             ),
-            ("a filter", ok(&spoken(Dialect::OpenaiChat, "", "content_filter")), Status::Refusal),
+            ("a filter", ok(&spoken(WireFormat::OpenaiChat, "", "content_filter")), Status::Refusal),
             ("null", openai(json!({ "finish_reason": "stop", "message": { "content": null } })), Status::Empty),
             ("no choice", http("200 OK", JSON, br#"{"choices": [], "usage": {}}"#), Status::Empty),
-            ("half an answer", ok(&spoken(Dialect::OpenaiChat, &decision("w"), "error")), Status::ServerError),
+            ("half an answer", ok(&spoken(WireFormat::OpenaiChat, &decision("w"), "error")), Status::ServerError),
             (
                 "parts of reasoning alone",
                 openai(json!({ "message": { "content": [{ "type": "reasoning_text", "text": decision("w") }] } })),
@@ -181,14 +182,14 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
     let part = |part| ok(&json!({ "candidates": [{ "content": { "parts": [part] }, "finishReason": "STOP" }] }));
     let blocked = json!({ "promptFeedback": { "blockReason": "SAFETY" }, "usageMetadata": {} });
     check(
-        Dialect::Gemini,
+        WireFormat::Gemini,
         vec![
             ("a blocked prompt", ok(&blocked), Status::Refusal),
-            ("unsafe", ok(&spoken(Dialect::Gemini, &decision("w"), "SAFETY")), Status::Refusal),
+            ("unsafe", ok(&spoken(WireFormat::Gemini, &decision("w"), "SAFETY")), Status::Refusal),
             ("prohibited", ok(&json!({ "candidates": [{ "finishReason": "PROHIBITED_CONTENT" }] })), Status::Refusal),
             ("no content", ok(&json!({ "candidates": [{ "finishReason": "STOP" }] })), Status::Empty),
             ("no candidate", ok(&json!({ "candidates": [], "usageMetadata": {} })), Status::Empty),
-            ("thoughts alone", ok(&spoken(Dialect::Gemini, "", "MAX_TOKENS")), Status::Truncated),
+            ("thoughts alone", ok(&spoken(WireFormat::Gemini, "", "MAX_TOKENS")), Status::Truncated),
             ("a part of thoughts", part(json!({ "thought": "true", "text": decision("w") })), Status::Empty),
             (
                 "a call in thoughts",
@@ -199,10 +200,10 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
     );
     let anthropic = |content, reason| ok(&json!({ "content": content, "stop_reason": reason }));
     check(
-        Dialect::AnthropicMessages,
+        WireFormat::AnthropicMessages,
         vec![
             ("a refusal", anthropic(json!([]), "refusal"), Status::Refusal),
-            ("half a refusal", ok(&spoken(Dialect::AnthropicMessages, "I w", "refusal")), Status::Refusal),
+            ("half a refusal", ok(&spoken(WireFormat::AnthropicMessages, "I w", "refusal")), Status::Refusal),
             ("no block", anthropic(json!([]), "end_turn"), Status::Empty),
             ("no text", anthropic(json!([{ "type": "thinking", "thinking": "hm" }]), "end_turn"), Status::Empty),
             ("a window too small", anthropic(json!([]), "model_context_window_exceeded"), Status::Truncated),
@@ -212,9 +213,9 @@ fn refusals_and_empty_answers_have_each_providers_own_form() {
 
 #[test]
 fn reasons_of_other_providers_are_understood_in_every_wire_format() {
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         let cut = &decision("w")[..20];
-        let ended = |reason: &str| ok(&spoken(dialect, cut, reason));
+        let ended = |reason: &str| ok(&spoken(wire_format, cut, reason));
         let cases = [
             ("length", Status::Truncated),
             ("MAX_TOKENS", Status::Truncated),
@@ -226,7 +227,7 @@ fn reasons_of_other_providers_are_understood_in_every_wire_format() {
             ("end_turn", Status::ParseFailed),
             ("STOP", Status::ParseFailed),
         ];
-        check(dialect, cases.into_iter().map(|(reason, status)| (reason, ended(reason), status)).collect());
+        check(wire_format, cases.into_iter().map(|(reason, status)| (reason, ended(reason), status)).collect());
     }
 }
 
@@ -237,12 +238,12 @@ fn a_text_that_the_provider_could_not_validate_is_a_step_without_a_decision() {
             json!({ "error": { "message": "Failed to generate JSON.", "code": code, "failed_generation": text } });
         http("400 Bad Request", JSON, error.to_string().as_bytes())
     };
-    for dialect in PROVIDERS {
+    for wire_format in PROVIDERS {
         let cases = vec![
             ("invalid JSON", rejected("json_validate_failed", "{\"action\": "), Status::ParseFailed),
             ("a failed call", rejected("tool_use_failed", "<function=reply>"), Status::ParseFailed),
         ];
-        check(dialect, cases);
+        check(wire_format, cases);
     }
 }
 
@@ -258,10 +259,10 @@ fn permanent_refusals_end_the_run_at_once() {
         ("429 Too Many Requests", credit),
     ];
     for (status, body) in cases {
-        for dialect in PROVIDERS {
+        for wire_format in PROVIDERS {
             let server = Server::start(move |_, _| http(status, "", body));
             let bench = Bench::new(Limits::default());
-            let vlm = bench.vlm(&server, dialect);
+            let vlm = bench.vlm(&server, wire_format);
             let replies = Bench::play(&vlm, "episode", 2);
             let reasons: Vec<_> = replies.into_iter().map(|reply| reply.unwrap_err().cause).collect();
             let sentence = format!("the provider refuses the request: HTTP {status}");
@@ -269,20 +270,20 @@ fn permanent_refusals_end_the_run_at_once() {
             assert!(said.starts_with(&sentence) && !said.contains('\n'), "{}", reasons[0]);
             assert_eq!(reasons[1], reasons[0]);
             assert_eq!(vlm.stopped(), Some(reasons[0].as_str()));
-            assert_eq!(server.count(), 1, "{status} {dialect:?}");
+            assert_eq!(server.count(), 1, "{status} {wire_format:?}");
         }
     }
 }
 
 #[test]
 fn a_redirect_is_not_followed() {
-    let elsewhere = Server::start(|_, _| whole(Dialect::OpenaiChat, &decision("w")));
+    let elsewhere = Server::start(|_, _| whole(WireFormat::OpenaiChat, &decision("w")));
     let address = elsewhere.address.clone();
     for status in ["301 Moved Permanently", "302 Found", "307 Temporary Redirect", "308 Permanent Redirect"] {
         let location = format!("location: {address}/chat/completions\r\n");
         let server = Server::start(move |_, _| http(status, &location, b""));
         let bench = Bench::new(Limits::default());
-        let lost = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat), "episode", 1).remove(0);
+        let lost = Bench::play(&bench.vlm(&server, WireFormat::OpenaiChat), "episode", 1).remove(0);
         assert!(lost.unwrap_err().cause.contains(status));
         assert!(server.requests()[0].head.contains(KEY));
     }
@@ -293,7 +294,7 @@ fn a_redirect_is_not_followed() {
 fn an_answer_that_takes_too_long_is_a_timeout_wherever_it_hangs() {
     let impatient = Patience { attempts: 2, timeout: Duration::from_millis(150), ..patience() };
     let pause = Duration::from_millis(40);
-    let fine = || whole(Dialect::OpenaiChat, &decision("w"));
+    let fine = || whole(WireFormat::OpenaiChat, &decision("w"));
     let slow: [(&str, Conduct); 3] = [
         ("nothing", Conduct::dripping(Vec::new(), 1, Duration::from_secs(1))),
         ("drips from the start", Conduct::dripping(fine(), 5, pause)),
@@ -302,7 +303,7 @@ fn an_answer_that_takes_too_long_is_a_timeout_wherever_it_hangs() {
     for (name, conduct) in slow {
         let server = Server::start(move |_, _| conduct.clone());
         let bench = Bench::new(Limits::default());
-        let vlm = bench.vlm_with(&server, Dialect::OpenaiChat, impatient);
+        let vlm = bench.vlm_with(&server, WireFormat::OpenaiChat, impatient);
         let lost = Bench::play(&vlm, "lost", 1).remove(0).unwrap_err();
         assert_eq!(lost.status, Some(Status::Timeout), "{name}");
         assert!(lost.cause.starts_with("step 1: timeout after 2 attempts"), "{name}: {lost}");
@@ -311,10 +312,11 @@ fn an_answer_that_takes_too_long_is_a_timeout_wherever_it_hangs() {
 
 #[test]
 fn slow_bytes_in_time_are_an_answer() {
-    let server =
-        Server::start(|_, _| Conduct::dripping(whole(Dialect::Gemini, &decision("w")), 16, Duration::from_millis(1)));
+    let server = Server::start(|_, _| {
+        Conduct::dripping(whole(WireFormat::Gemini, &decision("w")), 16, Duration::from_millis(1))
+    });
     let bench = Bench::new(Limits::default());
-    let reply = Bench::play(&bench.vlm(&server, Dialect::Gemini), "episode", 1).remove(0).unwrap();
+    let reply = Bench::play(&bench.vlm(&server, WireFormat::Gemini), "episode", 1).remove(0).unwrap();
     assert_eq!((reply.status, server.count()), (Status::Ok, 1));
 }
 
@@ -322,11 +324,11 @@ fn slow_bytes_in_time_are_an_answer() {
 fn retry_after_is_respected() {
     let server = Server::start(|at, _| match at {
         0 => http("429 Too Many Requests", "retry-after: 1\r\n", b""),
-        _ => whole(Dialect::AnthropicMessages, &decision("w")),
+        _ => whole(WireFormat::AnthropicMessages, &decision("w")),
     });
     let bench = Bench::new(Limits::default());
     let patience = Patience { longest_wait: Duration::from_secs(5), ..patience() };
-    let vlm = bench.vlm_with(&server, Dialect::AnthropicMessages, patience);
+    let vlm = bench.vlm_with(&server, WireFormat::AnthropicMessages, patience);
     let start = Instant::now();
     assert_eq!(Bench::play(&vlm, "episode", 1).remove(0).unwrap().status, Status::Ok);
     assert!(start.elapsed() >= Duration::from_secs(1), "the provider would have been asked too early");

@@ -1,6 +1,6 @@
 //! Unreadable replies are reported when they arrive, at the end, and from the trace.
 
-use mirrorstats_vlm::wire_format::Dialect;
+use mirrorstats_vlm::wire_format::WireFormat;
 use serde_json::{Value, json};
 
 use super::bench::KEY;
@@ -25,7 +25,7 @@ fn told(folder: &Folder, verb: &str) -> (String, Value) {
 #[test]
 fn a_recording_without_readable_replies_says_so_everywhere() {
     let reply = format!("I go on.\n\u{1b}[31m{KEY} {}", "on and ".repeat(100));
-    let server = Server::start(move |_, _| whole(Dialect::OpenaiCompatible, &reply));
+    let server = Server::start(move |_, _| whole(WireFormat::OpenaiCompatible, &reply));
     let folder = short();
     let output = folder.record(&server, "own", "--seeds 2 --runs 5 --json --keep-going").output().unwrap();
     let said = stderr(&output);
@@ -66,11 +66,11 @@ fn a_recording_without_readable_replies_says_so_everywhere() {
 #[test]
 fn an_unusable_reply_leaves_the_last_good_summary() {
     let server = Server::start(|at, _| match at {
-        0 => whole(Dialect::OpenaiCompatible, &decision("a").replace("went on", "saw a mirror")),
-        1 => whole(Dialect::OpenaiCompatible, "I go on."),
-        2 => ok(&spoken(Dialect::OpenaiCompatible, "", "content_filter")),
-        3 => whole(Dialect::OpenaiCompatible, &decision("a").replace("went on", "saw a wall")),
-        _ => whole(Dialect::OpenaiCompatible, &decision("done")),
+        0 => whole(WireFormat::OpenaiCompatible, &decision("a").replace("went on", "saw a mirror")),
+        1 => whole(WireFormat::OpenaiCompatible, "I go on."),
+        2 => ok(&spoken(WireFormat::OpenaiCompatible, "", "content_filter")),
+        3 => whole(WireFormat::OpenaiCompatible, &decision("a").replace("went on", "saw a wall")),
+        _ => whole(WireFormat::OpenaiCompatible, &decision("done")),
     });
     let folder = short();
     let output = folder.record(&server, "own", "--seeds 1 --runs 1").output().unwrap();
@@ -93,10 +93,10 @@ fn an_unusable_reply_leaves_the_last_good_summary() {
 #[test]
 fn statuses_are_counted_separately_and_readable_replies_not_listed() {
     let server = Server::start(|at, _| match at {
-        1 => whole(Dialect::OpenaiCompatible, "I go on."),
-        2 | 3 => ok(&spoken(Dialect::OpenaiCompatible, "", "content_filter")),
-        4 => whole(Dialect::OpenaiCompatible, &format!("<think>{}</think>{}", decision("a"), decision("w"))),
-        _ => whole(Dialect::OpenaiCompatible, &decision("w")),
+        1 => whole(WireFormat::OpenaiCompatible, "I go on."),
+        2 | 3 => ok(&spoken(WireFormat::OpenaiCompatible, "", "content_filter")),
+        4 => whole(WireFormat::OpenaiCompatible, &format!("<think>{}</think>{}", decision("a"), decision("w"))),
+        _ => whole(WireFormat::OpenaiCompatible, &decision("w")),
     });
     let folder = short();
     let output = folder.record(&server, "own", "--seeds 1 --runs 1 --json").output().unwrap();
@@ -109,7 +109,7 @@ fn statuses_are_counted_separately_and_readable_replies_not_listed() {
     let (text, _) = told(&folder, "validate");
     assert!(text.contains("3 of 20 steps with another status: parse_failed 1, refusal 2"), "{text}");
 
-    let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("w")));
+    let server = Server::start(|_, _| whole(WireFormat::OpenaiCompatible, &decision("w")));
     let folder = short();
     let output = folder.record(&server, "own", "--seeds 1 --runs 1 --json").output().unwrap();
     assert!(!stderr(&output).contains("could not be read"), "{}", stderr(&output));

@@ -47,11 +47,6 @@ const VERBS: &[Verb] = &[
     verb("", "plan --episodes 21 --register p.json", &["p.json"]),
     verb("definitions sensitivity b.parquet --out sens", "definitions sensitivity a.parquet --out sens", &["sens"]),
     verb("definitions sensitivity b.parquet --out link", "definitions sensitivity a.parquet --out link", &["link"]),
-    verb(
-        "world replay b.parquet --recompute-visibility -o v.parquet",
-        "world replay a.parquet --recompute-visibility -o v.parquet",
-        &["v.parquet"],
-    ),
     #[cfg(feature = "view")]
     verb("view b.parquet --export page", "view a.parquet --export page", &["page"]),
     #[cfg(feature = "polars")]

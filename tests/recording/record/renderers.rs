@@ -84,8 +84,6 @@ fn a_frame_with_other_contents_is_reported_as_different() {
         said.contains("E1/mimic/s1/r1, t = 2: frame_digest: recorded ") && said.contains(", 1 different"),
         "{said}"
     );
-    let replayed = run(bench.folder.path(), &["world", "replay", "runs/E1-mimic.parquet", "--skip-frames"]).done();
-    assert!(replayed.contains("all match") && !replayed.contains("frames:"), "{replayed}");
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::spec::Body;
 use mirrorstats_sim::body::{Figure, Pose, Stride};
-use mirrorstats_sim::camera::LabelCamera;
 use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::rng::Rng;
 use mirrorstats_sim::snapshot::{Shape, Solid};
@@ -23,7 +23,7 @@ fn a_body_never_shows_directly_in_its_own_view() {
 }
 
 fn never_shows(shape: Body, poses: usize) {
-    let mut chance = Rng::of(7, 7, 7);
+    let mut chance = Rng::for_run(7, 7, 7);
     need::drawing();
     let mut eye = LabelCamera::new(&shaped(shape), 160, 120).unwrap();
     let mut world = shaped_world(shape, Experiment::E1, 4);
@@ -89,7 +89,7 @@ fn a_body_is_within_its_cylinder_at_every_stride() {
 
 #[test]
 fn every_solid_is_inside_the_room() {
-    let mut chance = Rng::of(8, 8, 8);
+    let mut chance = Rng::for_run(8, 8, 8);
     for (at, experiment) in Experiment::PAPER.into_iter().cycle().take(25).enumerate() {
         let mut world = world(experiment.clone(), i32::try_from(at).unwrap());
         for _ in 0..20 {

@@ -110,7 +110,7 @@ fn only_candidates_have_a_distance() {
 
 #[test]
 fn nothing_ever_goes_through_anything() {
-    let mut chance = Rng::of(5, 5, 5);
+    let mut chance = Rng::for_run(5, 5, 5);
     for seed in 0..30 {
         let mut world = world(if seed % 2 == 0 { Experiment::E4 } else { Experiment::E5 }, seed);
         let mut moved = vec![0; world.figures().len()];

@@ -2,15 +2,15 @@
 //! show.
 
 use mirrorstats_experiment::Experiment;
-use mirrorstats_experiment::angle::Heading;
 use mirrorstats_experiment::file;
 use mirrorstats_experiment::spec::Body;
 use mirrorstats_sim::body::{Figure, Pose};
-use mirrorstats_sim::camera::{Camera, LabelCamera};
+use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::label_image::LabelImage;
+use mirrorstats_sim::mirror_eye;
 use mirrorstats_sim::model::Item;
-use mirrorstats_sim::passage;
 use mirrorstats_sim::rng::Rng;
 use mirrorstats_sim::scene::{HungPane, Scene};
 use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};
@@ -39,14 +39,6 @@ cubes = { kind = "none" }
 others = { least = 1, most = 1 }
 mirror = [{ kind = "delayed", delay = 3 }]
 mark = [{ part = "face", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
-
-[experiment.textured]
-title = "A mirror that looks like one"
-prompt = "exploration"
-look = "textured"
-cubes = { kind = "clutter", least = 3, most = 3, hides = 0 }
-others = { least = 1, most = 2 }
-mirror = [{}, { wall = "opposite" }]
 
 [experiment.painted]
 title = "A decoy in another colour"
@@ -123,7 +115,7 @@ fn holds_against_pictures(name: &str) {
     need::drawing();
     let experiment = kind(name);
     let mut eye = LabelCamera::new(&config(), 640, 480).unwrap();
-    let mut chance = Rng::of(77, 1, 2);
+    let mut chance = Rng::for_run(77, 1, 2);
     let mut overlaps: Vec<(f64, Shown)> = Vec::new();
     for seed in 0..POSES / 20 {
         let mut world = world(experiment.clone(), 1 + seed);
@@ -152,37 +144,6 @@ fn several_mirrors_agree_with_pictures() {
 }
 
 #[test]
-fn textured_mirrors_agree_with_pictures() {
-    holds_against_pictures("textured");
-}
-
-/// Textures change the picture but not visibility.
-#[test]
-fn textures_do_not_change_visibility() {
-    need::drawing();
-    let [textured, plain] = ["textured", "mirrors"].map(kind);
-    let config = config();
-    let scene = Scene::draw(&config, textured.clone(), 1, 1).unwrap();
-    let mut looks = [&textured, &plain].map(|experiment| {
-        let scene = Scene { experiment: experiment.clone(), ..scene.clone() };
-        World::new(&config, scene).unwrap()
-    });
-    let mut eyes = [textured, plain].map(|experiment| Camera::new(&config.of(&experiment)).unwrap());
-    let mut differs = 0;
-    for heading in 0..12 {
-        let pose = Pose { heading: Heading::new(heading), ..looks[0].pose() };
-        for world in &mut looks {
-            world.place_at(Figure::standing(pose), 1);
-        }
-        assert_eq!(looks[0].visibility(), looks[1].visibility());
-        let [one, other] = [0, 1].map(|at| eyes[at].frame(&looks[at]).unwrap());
-        differs += usize::from(one != other);
-        assert_eq!(one, eyes[0].frame(&looks[0]).unwrap(), "a picture comes again");
-    }
-    assert_eq!(differs, 12);
-}
-
-#[test]
 fn delayed_mirrors_agree_with_pictures() {
     holds_against_pictures("late");
 }
@@ -204,7 +165,7 @@ fn windows_agree_with_pictures() {
 
 #[test]
 fn visibility_through_panes_agrees_with_mujocos_rays() {
-    let mut chance = Rng::of(78, 1, 2);
+    let mut chance = Rng::for_run(78, 1, 2);
     let (mut differ, mut through) = (0_usize, 0_usize);
     for name in ["mirrors", "late", "painted", "stranger", "window"] {
         let mut world = world(kind(name), 3);
@@ -222,7 +183,7 @@ fn visibility_through_panes_agrees_with_mujocos_rays() {
 
 #[test]
 fn every_pane_is_counted_by_itself_and_all_together() {
-    let mut chance = Rng::of(79, 1, 2);
+    let mut chance = Rng::for_run(79, 1, 2);
     let mut world = world(kind("mirrors"), 2);
     assert_eq!(world.scene().panes.len(), 3);
     for _ in 0..20 {
@@ -245,7 +206,7 @@ fn a_late_mirror_shows_the_past() {
     let delay = late.panes[0].delay as usize;
     let mut world = world(late, 4);
     let mut past = vec![world.figures()];
-    let mut chance = Rng::of(80, 1, 2);
+    let mut chance = Rng::for_run(80, 1, 2);
     for step in 0..20 {
         scatter(&mut world, &mut chance);
         past.push(world.figures());
@@ -314,7 +275,7 @@ fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
 fn paints(name: &str, item: Item, expected: impl Fn(&Scene) -> Color) {
     need::drawing();
     let mut eye = Camera::new(&config()).unwrap();
-    let mut chance = Rng::of(81, 1, 2);
+    let mut chance = Rng::for_run(81, 1, 2);
     let (mut views, mut right) = (0, 0);
     for seed in 1..=8 {
         let mut world = world(kind(name), seed);
@@ -342,7 +303,7 @@ fn a_decoy_shows_the_own_body_in_another_colour() {
 #[test]
 fn a_window_shows_only_a_stranger() {
     paints("window", Item::Double, |scene| scene.panes[0].double.unwrap().color);
-    let mut chance = Rng::of(82, 1, 2);
+    let mut chance = Rng::for_run(82, 1, 2);
     let mut world = world(kind("window"), 3);
     for _ in 0..40 {
         wander(&mut world, &mut chance);
@@ -371,7 +332,7 @@ fn a_double_moves_whatever_the_agent_does() {
 fn a_mirror_reflects_the_eye_and_a_window_moves_it_back() {
     for name in ["mirrors", "window"] {
         let mut world = world(kind(name), 7);
-        let mut chance = Rng::of(83, 1, 2);
+        let mut chance = Rng::for_run(83, 1, 2);
         scatter(&mut world, &mut chance);
         let eye = world.pose().ahead(world.config().eye.forward);
         for (at, pane) in world.scene().panes.iter().enumerate() {
@@ -382,7 +343,7 @@ fn a_mirror_reflects_the_eye_and_a_window_moves_it_back() {
                 assert!((away + behind).abs() < 1e-9);
                 assert!((pane.place.aside(eye.spot()) - pane.place.aside(beyond.spot())).abs() < 1e-9);
             } else {
-                assert!((behind - away - passage::shift(world.config())).abs() < 1e-9);
+                assert!((behind - away - mirror_eye::shift(world.config())).abs() < 1e-9);
                 assert_eq!(beyond.heading, eye.heading);
             }
         }

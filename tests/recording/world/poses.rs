@@ -54,7 +54,7 @@ fn free_pose(plan: &FloorPlan, placed: &[Figure], chance: &mut Rng) -> Pose {
 
 /// Calls `each` with this number of scattered worlds, and a new scene for every ten.
 pub fn for_scattered(shape: Body, experiments: &[Experiment], poses: i32, mut each: impl FnMut(&World)) {
-    let mut chance = Rng::of(2026, 11, 21);
+    let mut chance = Rng::for_run(2026, 11, 21);
     for at in 0..(poses + 9) / 10 {
         let experiment = experiments[usize::try_from(at).unwrap() % experiments.len()].clone();
         let mut world = shaped_world(shape, experiment, 1000 + at);

@@ -2,8 +2,8 @@
 //! the mirror shows.
 
 use mirrorstats_experiment::{Experiment, built_in, built_in_names, file};
-use mirrorstats_sim::camera::LabelCamera;
 use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::placement;
 use mirrorstats_sim::scene::Scene;
@@ -78,7 +78,7 @@ fn no_body_has_the_colour_of_the_mark_or_of_the_hand() {
 #[test]
 fn visibility_of_hands_agrees_with_pictures_and_mujocos_rays() {
     need::drawing();
-    let config = WorldConfig::default().of(&named("reach-mirror"));
+    let config = WorldConfig::default().for_experiment(&named("reach-mirror"));
     let mut eye = LabelCamera::new(&config, 640, 480).unwrap();
     for run in 1..=2 {
         let mut world = world("reach-mirror", 1, run);

@@ -178,7 +178,7 @@ fn random_clutter_stands_on_the_floor_anywhere_and_leaves_the_mirror_in_view() {
     // The area before the mirror is a twentieth of the floor but has nine tenths of E5's clutter.
     assert!(before > 0 && before * 8 < cubes, "{before} of {cubes}");
     let [ours, theirs] =
-        [Experiment::E5, random].map(|experiment| Occlusion::of(&config, &experiment).expect("the scenes fit"));
+        [Experiment::E5, random].map(|experiment| Occlusion::measured(&config, &experiment).expect("the scenes fit"));
     assert!(2 * ours.hidden >= ours.places, "{ours:?}");
     assert!(theirs.places > 0 && 10 * theirs.hidden < theirs.places, "{theirs:?}");
 }

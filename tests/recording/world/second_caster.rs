@@ -127,7 +127,7 @@ fn own_px(world: &World, past: &[Snapshot]) -> u32 {
 fn compare(shape: Body, views: usize) {
     let names = ["E1", "E4", "E5", "two-mirrors", "delayed", "decoy", "window", "mark"];
     let config = shaped(shape);
-    let mut chance = Rng::of(4711, 1, 1);
+    let mut chance = Rng::for_run(4711, 1, 1);
     let (mut compared, mut seen) = (0, 0);
     for (name, seed) in (1..).flat_map(|seed| names.map(|name| (name, seed))) {
         let scene = Scene::draw(&config, Experiment::parse(name).unwrap(), seed, 1).unwrap();

@@ -45,7 +45,7 @@ fn things_out_of_view_change_no_picture() {
     let config = WorldConfig::default();
     let mut eyes = [Camera::new(&config).unwrap(), Camera::new(&config).unwrap()];
     eyes[1].draw_all(true);
-    let mut chance = Rng::of(60, 1, 2);
+    let mut chance = Rng::for_run(60, 1, 2);
     for (at, experiment) in [Experiment::E4, Experiment::E5].into_iter().cycle().take(12).enumerate() {
         let mut world = world(experiment.clone(), i32::try_from(at).unwrap());
         for _ in 0..3 {

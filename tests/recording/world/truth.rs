@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::spec::Body;
-use mirrorstats_sim::camera::{Camera, LabelCamera};
+use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
+use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::label_image::LabelImage;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};

@@ -24,7 +24,7 @@ pub(crate) struct Conversation {
 impl Conversation {
     /// The conversation of an episode; frame files are below `scratch`.
     pub(crate) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
-        let prompt = Prompt::of(&task.experiment).map_err(Lost::unobservable)?;
+        let prompt = Prompt::for_experiment(&task.experiment).map_err(Lost::unobservable)?;
         let frames = match images {
             Images::Path => {
                 let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, "frames"));

@@ -27,20 +27,17 @@ pub enum Design {
 
 names!(Design { Split: "split", Crossed: "crossed", OwnSeeds: "own-seeds" });
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// By experiment, seed and run.
-    Planned,
-    /// By the rows of a Latin square in which each item follows every other item equally often.
-    Counterbalanced,
+impl Design {
+    /// The order of play: by experiment, seed and run; or by the rows of a Latin square in which each item follows every
+    /// other item equally often, if all play the same scenes.
+    pub const fn order(self) -> &'static str {
+        if matches!(self, Self::Crossed) { "counterbalanced" } else { "planned" }
+    }
 }
-
-names!(Order { Planned: "planned", Counterbalanced: "counterbalanced" });
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Schedule {
     pub design: Design,
-    pub order: Order,
     /// The seeds of one participant.
     pub seeds: i32,
     /// The number of times that one participant plays a scene.
@@ -61,7 +58,7 @@ impl Schedule {
                 lane.push(episode);
             }
         }
-        if self.order == Order::Counterbalanced {
+        if self.design == Design::Crossed {
             lanes = lanes.into_iter().enumerate().map(|(row, lane)| counterbalanced(lane, row)).collect();
         }
         lanes
@@ -101,7 +98,7 @@ fn latin_row(n: usize, row: usize) -> Vec<usize> {
 mod tests {
     use std::collections::BTreeMap;
 
-    use super::{Design, Order, Planned, Schedule, latin_row};
+    use super::{Design, Planned, Schedule, latin_row};
 
     fn planned(seeds: i32, repeats: i32) -> Vec<Planned> {
         let episode = |seed, repetition| Planned {
@@ -133,18 +130,16 @@ mod tests {
 
     #[test]
     fn designs_divide_the_episodes() {
-        let schedule = |design, order| Schedule { design, order, seeds: 2, repeats: 1 };
+        let schedule = |design| Schedule { design, seeds: 2, repeats: 1 };
         let ids = |schedule: Schedule, planned: &[Planned]| -> Vec<Vec<String>> {
             let lanes = schedule.lanes(planned, 2).into_iter();
             lanes.map(|lane| lane.into_iter().map(|episode| episode.episode_id.clone()).collect()).collect()
         };
-        let crossed = ids(schedule(Design::Crossed, Order::Planned), &planned(2, 2));
-        assert_eq!(crossed, [["s1/x1", "s2/x1"], ["s1/x2", "s2/x2"]]);
-        let balanced = ids(schedule(Design::Crossed, Order::Counterbalanced), &planned(2, 2));
-        assert_eq!(balanced, [["s1/x1", "s2/x1"], ["s2/x2", "s1/x2"]]);
-        let own = ids(schedule(Design::OwnSeeds, Order::Planned), &planned(4, 1));
+        let crossed = ids(schedule(Design::Crossed), &planned(2, 2));
+        assert_eq!(crossed, [["s1/x1", "s2/x1"], ["s2/x2", "s1/x2"]]);
+        let own = ids(schedule(Design::OwnSeeds), &planned(4, 1));
         assert_eq!(own, [["s1/x1", "s2/x1"], ["s3/x1", "s4/x1"]]);
-        let split = ids(schedule(Design::Split, Order::Planned), &planned(3, 1));
+        let split = ids(schedule(Design::Split), &planned(3, 1));
         assert_eq!(split, [vec!["s1/x1", "s3/x1"], vec!["s2/x1"]]);
     }
 }

@@ -209,8 +209,8 @@ impl Hub {
     pub(super) fn end(&self, is_complete: bool) {
         let start = Instant::now();
         let seats = || (0..self.seats.len()).map(|seat| self.seat(seat));
-        seats().for_each(|mut seat| seat.end = Some(End { is_complete, is_told: false }));
-        let is_due = |seat: &Seat| seat.is_open() && seat.end.is_some_and(|end| !end.is_told);
+        seats().for_each(|mut seat| seat.end = Some(End { is_complete, is_shown: false }));
+        let is_due = |seat: &Seat| seat.is_open() && seat.end.is_some_and(|end| !end.is_shown);
         while start.elapsed() < LISTENING && seats().any(|seat| is_due(&seat)) {
             std::thread::sleep(Duration::from_millis(20));
         }
@@ -220,8 +220,8 @@ impl Hub {
         }
     }
 
-    pub(super) fn told(&self, seat: usize) -> Value {
-        self.seat(seat).told(&self.terms)
+    pub(super) fn state(&self, seat: usize) -> Value {
+        self.seat(seat).state(&self.terms)
     }
 
     pub(super) fn agree(&self, seat: usize) -> io::Result<()> {

@@ -83,14 +83,14 @@ impl Player for Human {
             "clock": "breaks and times of more than 10 s without the page do not count",
             "time_limit": null,
             "design": schedule.design.name(),
-            "order": schedule.order.name(),
+            "order": schedule.design.order(),
             "consent": self.consent,
             "identification_version": mirrorstats_trace::episodes::identification::VERSION,
         })
     }
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
-        let prompt = Prompt::of(&task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
+        let prompt = Prompt::for_experiment(&task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
         let seat = self.hub.sit(episode_id).ok_or_else(Lost::by_leaving)?;
         let code = self.hub.code(seat);
         let hub = Arc::clone(&self.hub);

@@ -52,7 +52,7 @@ pub struct Terms {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct End {
     pub(crate) is_complete: bool,
-    pub is_told: bool,
+    pub is_shown: bool,
 }
 
 #[derive(Debug)]
@@ -113,15 +113,15 @@ impl Seat {
         }
     }
 
-    pub fn told(&mut self, terms: &Terms) -> Value {
+    pub fn state(&mut self, terms: &Terms) -> Value {
         self.heard();
         if let Some(end) = &mut self.end {
-            end.is_told = true;
+            end.is_shown = true;
         }
-        let mut told = self.phase(terms);
-        (told["code"], told["contact"]) = (json!(self.code), json!(terms.contact));
-        (told["played"], told["number"]) = (json!(self.played), json!(self.number));
-        told
+        let mut state = self.phase(terms);
+        (state["code"], state["contact"]) = (json!(self.code), json!(terms.contact));
+        (state["played"], state["number"]) = (json!(self.played), json!(self.number));
+        state
     }
 
     fn phase(&mut self, terms: &Terms) -> Value {

@@ -105,7 +105,7 @@ fn file(text: impl IntoResponse, kind: &'static str) -> Response {
     ([(header::CONTENT_TYPE, kind)], text).into_response()
 }
 
-fn told(value: &Value) -> Response {
+fn json_response(value: &Value) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
 }
 
@@ -123,7 +123,7 @@ fn stranger() -> Response {
 fn state_after(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, does: fn(&Hub, usize)) -> Response {
     for_person(&hub, &link, |seat| {
         does(&hub, seat);
-        told(&hub.told(seat))
+        json_response(&hub.state(seat))
     })
 }
 
@@ -139,7 +139,7 @@ async fn frame(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Respons
 
 async fn agree(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
     for_person(&hub, &link, |seat| match hub.agree(seat) {
-        Ok(()) => told(&hub.told(seat)),
+        Ok(()) => json_response(&hub.state(seat)),
         Err(_) => unwritten(),
     })
 }
@@ -161,7 +161,7 @@ async fn leave(hub: Arc<Hub>, link: Link, how: Leaving) -> Response {
     let Some(seat) = link.p.as_deref().and_then(|token| hub.seat_of(token)) else { return stranger() };
     let leaving = Arc::clone(&hub);
     match tokio::task::spawn_blocking(move || leaving.leave(seat, how)).await {
-        Ok(Ok(())) => told(&hub.told(seat)),
+        Ok(Ok(())) => json_response(&hub.state(seat)),
         _ => unwritten(),
     }
 }
@@ -172,6 +172,6 @@ async fn reply(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Byte
             return (StatusCode::BAD_REQUEST, "no reply").into_response();
         };
         let taken = hub.seat(seat).answer(&hub.terms, number, Value::Object(reply).to_string());
-        told(&json!({ "taken": taken }))
+        json_response(&json!({ "taken": taken }))
     })
 }

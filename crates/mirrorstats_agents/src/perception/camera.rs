@@ -40,7 +40,7 @@ pub struct Viewpoint {
 }
 
 impl Viewpoint {
-    pub fn of(observation: &Observation) -> Self {
+    pub fn from_observation(observation: &Observation) -> Self {
         let place = Place { x: f64::from(observation.x), y: f64::from(observation.y) };
         Self { place, heading: Heading::nearest(f64::from(observation.yaw)) }
     }

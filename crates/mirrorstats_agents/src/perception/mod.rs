@@ -38,9 +38,9 @@ pub struct View {
 }
 
 impl View {
-    pub fn of(observation: &Observation) -> Self {
+    pub fn from_observation(observation: &Observation) -> Self {
         let frame = Arc::clone(&observation.frame);
-        let pose = Viewpoint::of(observation);
+        let pose = Viewpoint::from_observation(observation);
         let camera = ViewCamera::new(pose, frame.width, frame.height, observation.fov_y);
         let patches = patches::patches(&frame, LEAST_OF_PATCH);
         Self {

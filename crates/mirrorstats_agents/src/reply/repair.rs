@@ -65,7 +65,7 @@ impl Repair {
 }
 
 /// The changed text; `None` if there is nothing to repair.
-type Change = fn(&str) -> Option<String>;
+type TextRepair = fn(&str) -> Option<String>;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum NoObject {
@@ -85,7 +85,7 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     has_answer(raw.trim())?;
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
-    let steps: [(Repair, Change); 9] = [
+    let steps: [(Repair, TextRepair); 9] = [
         (Repair::CodeFence, without_fence),
         (Repair::Thoughts, without_thoughts),
         (Repair::CodeFence, without_fence),
@@ -114,7 +114,7 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
 fn without_call(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object, Vec<Repair>) {
     let arguments = || {
         let opening = |piece| matches!(piece, JsonPiece::Mark(_, '{')).then_some(piece);
-        let JsonPiece::Mark(at, _) = Pieces::of(text).filter_map(opening).nth(1)? else { return None };
+        let JsonPiece::Mark(at, _) = Pieces::new(text).filter_map(opening).nth(1)? else { return None };
         let length = end_of_object(&text[at..])?;
         Object::parse(&text[at..at + length]).ok()
     };
@@ -129,7 +129,7 @@ fn without_call(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object
 
 /// Rejects a text of thoughts alone: an object within them is no answer.
 fn has_answer(text: &str) -> Result<(), NoObject> {
-    match thoughts::of(text) {
+    match thoughts::split(text) {
         Thoughts::Open => Err(NoObject::OpenThoughts),
         Thoughts::Before("") => Err(NoObject::ThoughtsAlone),
         Thoughts::Before(_) | Thoughts::None => Ok(()),
@@ -137,7 +137,7 @@ fn has_answer(text: &str) -> Result<(), NoObject> {
 }
 
 fn without_thoughts(text: &str) -> Option<String> {
-    match thoughts::of(text) {
+    match thoughts::split(text) {
         Thoughts::Before(answer) => Some(answer.to_owned()),
         Thoughts::None | Thoughts::Open => None,
     }
@@ -166,7 +166,7 @@ fn without_surroundings(text: &str) -> Option<String> {
 
 fn end_of_object(text: &str) -> Option<usize> {
     let mut depth = 0_usize;
-    let mut pieces = Pieces::of(text);
+    let mut pieces = Pieces::new(text);
     while let Some(piece) = pieces.next_outside_comments() {
         match piece {
             JsonPiece::Mark(_, '{') => depth += 1,
@@ -185,7 +185,7 @@ fn end_of_object(text: &str) -> Option<usize> {
 fn without_trailing_commas(text: &str) -> Option<String> {
     let mut dropped = Vec::new();
     let mut comma = None;
-    for piece in Pieces::of(text) {
+    for piece in Pieces::new(text) {
         match piece {
             JsonPiece::Mark(at, ',') => comma = Some(at),
             JsonPiece::Mark(_, '}' | ']') => dropped.extend(comma.take()),
@@ -202,7 +202,7 @@ fn without_trailing_commas(text: &str) -> Option<String> {
 fn with_double_quotes(text: &str) -> Option<String> {
     let mut changed = String::with_capacity(text.len());
     let mut is_changed = false;
-    for piece in Pieces::of(text) {
+    for piece in Pieces::new(text) {
         match piece {
             JsonPiece::Mark(_, c) => changed.push(c),
             JsonPiece::Quoted(string) => match string.strip_prefix('\'').and_then(|rest| rest.strip_suffix('\'')) {
@@ -234,7 +234,7 @@ fn push_inside(text: &mut String, inside: &str) {
 }
 
 fn without_comments(text: &str) -> Option<String> {
-    let (mut kept, mut pieces) = (String::with_capacity(text.len()), Pieces::of(text));
+    let (mut kept, mut pieces) = (String::with_capacity(text.len()), Pieces::new(text));
     while let Some(piece) = pieces.next_outside_comments() {
         match piece {
             JsonPiece::Mark(_, c) => kept.push(c),
@@ -254,7 +254,7 @@ fn length_of_comment(text: &str) -> Option<usize> {
 
 fn with_escaped_controls(text: &str) -> Option<String> {
     let (mut changed, mut is_changed) = (String::with_capacity(text.len()), false);
-    for piece in Pieces::of(text) {
+    for piece in Pieces::new(text) {
         match piece {
             JsonPiece::Mark(_, c) => changed.push(c),
             JsonPiece::Quoted(string) => is_changed |= push_escaped(&mut changed, string),
@@ -290,7 +290,7 @@ struct Pieces<'a> {
 }
 
 impl<'a> Pieces<'a> {
-    fn of(text: &'a str) -> Self {
+    fn new(text: &'a str) -> Self {
         Self { text, at: 0, before: ':' }
     }
 

@@ -94,7 +94,7 @@ pub(super) enum Thoughts<'a> {
 ///
 /// They end with the last closing mark of their kind, so thoughts may mention the mark. If only an object follows an
 /// earlier one, they end there: later ones are in the answer's strings, as are opening marks after the first brace.
-pub(super) fn of(text: &str) -> Thoughts<'_> {
+pub(super) fn split(text: &str) -> Thoughts<'_> {
     let (mut rest, mut found) = (text, Thoughts::None);
     loop {
         if found != Thoughts::None && Object::parse(rest).is_ok() {
@@ -118,7 +118,7 @@ pub(super) fn of(text: &str) -> Thoughts<'_> {
 /// Returns true if a text has an object outside of its thoughts.
 #[cfg(feature = "play")]
 pub fn has_object(text: &str) -> bool {
-    match of(text) {
+    match split(text) {
         Thoughts::None => text.contains('{'),
         Thoughts::Before(answer) => answer.contains('{'),
         Thoughts::Open => false,
@@ -156,7 +156,7 @@ fn without_end(text: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use super::{Thoughts, of};
+    use super::{Thoughts, split};
 
     #[test]
     fn thoughts_end_with_the_last_closing_tag() {
@@ -205,7 +205,7 @@ mod tests {
                 Thoughts::Before("{}"),
             ),
         ] {
-            assert_eq!(of(text), expected, "{text}");
+            assert_eq!(split(text), expected, "{text}");
         }
     }
 }

@@ -29,7 +29,7 @@ const LEAST: usize = 12;
 const MOST: usize = 2600;
 
 /// To the left and up, m.
-pub(super) type Place = [f64; 2];
+pub(super) type Spot = [f64; 2];
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct HandView {
@@ -40,8 +40,8 @@ pub(super) struct HandView {
 impl HandView {
     /// Reads a picture. A colour that is also seen directly is the hand's; otherwise the mark is the colour that can be
     /// on the front of the body, the larger patch if both can.
-    pub fn of(observation: &Observation) -> Self {
-        let eye = Eye::of(observation);
+    pub fn from_observation(observation: &Observation) -> Self {
+        let eye = Eye::from_observation(observation);
         let all = patches(&observation.frame, LEAST);
         let small: Vec<Color> = Color::ALL.into_iter().filter(|color| is_small(&all, *color)).collect();
         let mut seen: Vec<(ColorPatch, bool)> =
@@ -68,7 +68,7 @@ pub(super) struct Eye {
 }
 
 impl Eye {
-    pub fn of(observation: &Observation) -> Self {
+    pub fn from_observation(observation: &Observation) -> Self {
         let frame = &observation.frame;
         Self { size: [real(frame.width), real(frame.height)], tangent: (observation.fov_y.to_radians() / 2.0).tan() }
     }
@@ -79,7 +79,7 @@ impl Eye {
     }
 
     /// The position of a thing `ahead` of the body whose reflection is in the middle of a patch.
-    pub fn place(&self, patch: &ColorPatch, ahead: f64) -> Place {
+    pub fn place(&self, patch: &ColorPatch, ahead: f64) -> Spot {
         let row = real(patch.top + patch.bottom + 1) / 2.0;
         let aside = (2.0 * patch.middle() / self.size[0] - 1.0) * self.tangent * self.size[0] / self.size[1];
         let above = (1.0 - 2.0 * row / self.size[1]) * self.tangent;

@@ -72,7 +72,7 @@ pub struct Knowledge {
 impl Knowledge {
     pub fn new(observation: &Observation) -> Self {
         Self {
-            pose: Viewpoint::of(observation),
+            pose: Viewpoint::from_observation(observation),
             room: Room::default(),
             reflection: Reflection::default(),
             bodies: Vec::new(),
@@ -86,7 +86,7 @@ impl Knowledge {
     }
 
     pub fn see(&mut self, observation: &Observation) {
-        let view = View::of(observation);
+        let view = View::from_observation(observation);
         self.feel(observation, view.pose);
         self.room.see(&view);
         self.see_cubes(&view.cubes, view.camera.eye);

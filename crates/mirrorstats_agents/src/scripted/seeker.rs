@@ -165,7 +165,7 @@ impl<C: Policy> Script for Seeker<C> {
         let is_open = experiment.asks_for_mark() && mark.is_none() || answering::may_come(experiment, &answers);
         let (action, selected) = self.act(&known, belief, is_open, observation.remaining);
         self.has_claimed |= belief.settled || self.guess.is_some();
-        let words = words::of(&known, belief, action, selected);
+        let words = words::describe(&known, belief, action, selected);
         self.known = Some(known);
         Move { action: Some(action), claim: belief.claim, selected, mark, answers, words }
     }

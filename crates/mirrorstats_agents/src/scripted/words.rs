@@ -8,7 +8,7 @@ use mirrorstats_trace::episodes::palette::Color;
 use super::knowledge::Knowledge;
 use super::policy::Belief;
 
-pub fn of(known: &Knowledge, belief: Belief, action: Action, selected: Option<Color>) -> Words {
+pub fn describe(known: &Knowledge, belief: Belief, action: Action, selected: Option<Color>) -> Words {
     let cubes = named(&known.cubes_in_view, "cube", "cubes");
     let bodies = named(&known.bodies, "body", "bodies");
     Words {

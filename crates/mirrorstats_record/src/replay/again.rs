@@ -12,20 +12,14 @@ use mirrorstats_trace::episodes::episode::{Episode, Extra, Step};
 use mirrorstats_trace::episodes::palette::Color;
 use mirrorstats_trace::schema::{self, Value};
 
-/// The maximum number of rays per row and per column of the visibility grid.
-pub const MOST_RAYS: u32 = 4096;
-
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
     pub experiment: Experiment,
     pub config: WorldConfig,
-    /// The same configuration with the grid and threshold of the trace's pixel counts: the recorded ones, unless the
-    /// pixels were recounted.
-    pub eye: WorldConfig,
 }
 
 impl Recipe {
-    pub fn of(recording: &Json) -> Result<Self, ReplayError> {
+    pub fn from_recording(recording: &Json) -> Result<Self, ReplayError> {
         // This check is first: a world of another version may lack values that this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
         if !SCENE_VERSIONS.iter().any(|drawn| *version == *drawn) {
@@ -41,8 +35,7 @@ impl Recipe {
         let spec = recording.get("experiment").ok_or(ReplayError::NoRecipe)?;
         let spec: Spec =
             serde_json::from_value(spec.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
-        let eye = counted_with(&config, recording);
-        Ok(Self { experiment: Experiment::of_footer(spec), config, eye })
+        Ok(Self { experiment: Experiment::from_footer(spec), config })
     }
 
     pub fn world(&self, episode: &Episode, eye: &WorldConfig) -> Result<World, ReplayError> {
@@ -60,20 +53,6 @@ impl Recipe {
     }
 }
 
-fn counted_with(config: &WorldConfig, recording: &Json) -> WorldConfig {
-    let number = |value: Option<&Json>| u32::try_from(value?.as_u64()?).ok();
-    let grid = |side: &str| {
-        let side = number(recording.get("visibility_grid").and_then(|grid| grid.get(side)));
-        side.filter(|side| (1..=MOST_RAYS).contains(side))
-    };
-    let mut eye = config.clone();
-    eye.eye.width = grid("width").unwrap_or(eye.eye.width);
-    eye.eye.height_px = grid("height").unwrap_or(eye.eye.height_px);
-    let threshold = number(recording.get("visibility_threshold_px"));
-    eye.evidence.mirror_self_px = threshold.unwrap_or(eye.evidence.mirror_self_px);
-    eye
-}
-
 /// Repeats an episode's actions; calls `look` before each step with the world and its visibility.
 pub fn again<E: From<ReplayError>>(
     recipe: &Recipe,
@@ -82,7 +61,7 @@ pub fn again<E: From<ReplayError>>(
     mut look: impl FnMut(i32, &World, &Visibility, &Step) -> Result<(), E>,
 ) -> Result<Option<Divergence>, E> {
     let mut world = recipe.world(episode, eye)?;
-    let is_same_eye = *eye == recipe.eye;
+    let is_same_eye = *eye == recipe.config;
     let mut parted = differs(episode, 0, &constants(episode, world.scene()));
     for (t, (at, step)) in (1..).zip(episode.steps.iter().enumerate()) {
         let visibility = world.visibility();

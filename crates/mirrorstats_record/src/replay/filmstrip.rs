@@ -98,7 +98,7 @@ impl Strip {
         let mut undrawable = None;
         for (input, file) in traces.iter().zip(set.files()) {
             // All rows are read at once, so a file that cannot be drawn is not read.
-            let recipe = match Recipe::of(&file.recording()) {
+            let recipe = match Recipe::from_recording(&file.recording()) {
                 Ok(recipe) => recipe,
                 Err(error) => {
                     undrawable.get_or_insert(error);
@@ -114,7 +114,7 @@ impl Strip {
 
     fn rendered(&self, recipe: &Recipe, episode: Episode) -> Result<Reel, ReplayError> {
         let wanted = chosen(&episode, self.count);
-        let frames = rendered(recipe, &recipe.eye, &episode, i32::MAX, |t| wanted.contains(&t))?;
+        let frames = rendered(recipe, &recipe.config, &episode, i32::MAX, |t| wanted.contains(&t))?;
         self.reel(episode, frames)
     }
 

@@ -31,8 +31,8 @@ pub fn frames(
     episode: &Episode,
     steps: &RangeInclusive<i32>,
 ) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
-    let recipe = Recipe::of(recording.unwrap_or(&Value::Null))?;
-    let mut eye = recipe.eye.clone();
+    let recipe = Recipe::from_recording(recording.unwrap_or(&Value::Null))?;
+    let mut eye = recipe.config.clone();
     let columns = eye.eye.width * RAYS / eye.eye.height_px.max(1);
     (eye.eye.width, eye.eye.height_px) = (columns.max(1), RAYS);
     rendered(&recipe, &eye, episode, *steps.end(), |t| steps.contains(&t))
@@ -68,5 +68,5 @@ pub(super) fn rendered(
 
 /// Returns true if a trace describes its world, and this program can build it.
 pub fn is_recipe(recording: Option<&Value>) -> bool {
-    recording.is_some_and(|recording| Recipe::of(recording).is_ok())
+    recording.is_some_and(|recording| Recipe::from_recording(recording).is_ok())
 }

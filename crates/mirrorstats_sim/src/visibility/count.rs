@@ -111,13 +111,13 @@ struct Counts<'a> {
 }
 
 impl Counts<'_> {
-    fn of(&self, shown: Shown) -> u32 {
+    fn pixels(&self, shown: Shown) -> u32 {
         self.tally[usize::from(shown.code())]
     }
 
     fn sighting(&self, item: Item, color: Color) -> Sighting {
-        let through = (0..self.scene.panes.len()).map(|pane| self.of(Shown::Through(pane, item)));
-        Sighting { color, direct_px: self.of(Shown::Direct(item)), mirror_px: through.sum() }
+        let through = (0..self.scene.panes.len()).map(|pane| self.pixels(Shown::Through(pane, item)));
+        Sighting { color, direct_px: self.pixels(Shown::Direct(item)), mirror_px: through.sum() }
     }
 
     fn marks(&self, wearer: usize) -> impl Iterator<Item = Item> {
@@ -135,7 +135,7 @@ impl Counts<'_> {
     }
 
     fn pane(&self, pane: usize) -> PaneSighting {
-        let through = |item: Item| self.of(Shown::Through(pane, item));
+        let through = |item: Item| self.pixels(Shown::Through(pane, item));
         let body = |agent: usize| through(Item::Agent(agent)) + self.marks(agent).map(through).sum::<u32>();
         let (self_px, double_px) = (body(0), through(Item::Double));
         let other_px = (1..=self.scene.others.len()).map(body).sum::<u32>();

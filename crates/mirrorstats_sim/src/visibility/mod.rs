@@ -1,7 +1,7 @@
 //! Ground truth: the content of each pixel of the eye's view, by ray casting.
 //!
 //! A ray goes from the eye through the middle of a pixel to the nearest surface. At a pane it continues: all rays
-//! through a pane start from one point ([`super::passage`]), so each pane is another view over the same pixels. Its
+//! through a pane start from one point ([`super::mirror_eye`]), so each pane is another view over the same pixels. Its
 //! stage has the bodies that the pane shows, with its delay. A window is a view into the same room from further back,
 //! so there too, rays that hit nothing else hit walls.
 //!

@@ -1,8 +1,8 @@
 //! The eye as a point and three directions, and the codes of what its rays meet.
 
 use super::super::label_image::LabelImage;
+use super::super::mirror_eye;
 use super::super::model::{Item, Stage, group};
-use super::super::passage;
 use super::super::scene::HungPane;
 use super::super::world::World;
 use mirrorstats_experiment::angle::sine_cosine;
@@ -29,7 +29,8 @@ impl Shown {
     /// The meaning of a byte of [`Shown::code`].
     pub fn of_code(code: u8) -> Self {
         let (look, at) = (usize::from(code) / Item::COUNT, usize::from(code) % Item::COUNT);
-        look.checked_sub(1).map_or(Self::Direct(Item::of_number(at)), |pane| Self::Through(pane, Item::of_number(at)))
+        look.checked_sub(1)
+            .map_or(Self::Direct(Item::from_number(at)), |pane| Self::Through(pane, Item::from_number(at)))
     }
 
     pub const fn pane(self) -> Option<usize> {
@@ -102,7 +103,7 @@ impl RayView {
         let [x, y] = pane.place.center(world.config());
         if pane.kind == PaneKind::Window {
             let back = [-out_x, -out_y, 0.0];
-            return Self { origin: plus(self.origin, passage::shift(world.config()), back), ..*self };
+            return Self { origin: plus(self.origin, mirror_eye::shift(world.config()), back), ..*self };
         }
         self.reflected([x, y, pane.center_height], [-out_x, -out_y, 0.0])
     }
@@ -161,7 +162,7 @@ fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vect
     let [out_x, out_y] = hung.place.heading().direction();
     let out = [out_x, out_y, 0.0];
     let (from, ray) = match hung.kind {
-        PaneKind::Window => (plus(met, -passage::shift(world.config()), out), ray),
+        PaneKind::Window => (plus(met, -mirror_eye::shift(world.config()), out), ray),
         _ => (met, plus(ray, -2.0 * dot(ray, out), out)),
     };
     let from = plus(from, 1e-9, ray);

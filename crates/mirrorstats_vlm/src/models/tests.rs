@@ -1,4 +1,4 @@
-use super::{Dialect, Models, Prices};
+use super::{Models, Prices, WireFormat};
 
 #[test]
 fn a_cost_needs_both_prices() {
@@ -19,7 +19,7 @@ fn cached_tokens_have_a_price_of_their_own() {
     let body = serde_json::json!({ "choices": [], "usage": {
         "prompt_tokens": 500_000, "completion_tokens": 1_000_000, "prompt_tokens_details": { "cached_tokens": 400_000 },
     } });
-    let answer = Dialect::OpenaiChat.answer(&body).unwrap();
+    let answer = WireFormat::OpenaiChat.answer(&body).unwrap();
     let prices = Prices { input: Some(2.0), cached_input: Some(0.5), output: Some(3.0) };
     assert!((prices.cost_usd(&answer).unwrap() - 3.4).abs() < 1e-9);
     assert_eq!(Prices { cached_input: None, ..prices }.cost_usd(&answer), Some(4.0));

@@ -10,7 +10,7 @@ use tokio::time::sleep_until;
 use mirrorstats_agents::locked;
 
 #[derive(Debug)]
-pub(crate) struct Pace {
+pub(crate) struct ConcurrencyLimiter {
     permits: Semaphore,
     state: Mutex<State>,
     interval: Duration,
@@ -33,10 +33,10 @@ struct State {
 /// Permission for one request, which counts as in flight until this is dropped.
 #[derive(Debug)]
 pub struct Permit<'a> {
-    pace: &'a Pace,
+    limiter: &'a ConcurrencyLimiter,
 }
 
-impl Pace {
+impl ConcurrencyLimiter {
     /// At most `most` concurrent requests, and at least one; one per `interval`.
     pub fn new(most: usize, interval: Duration) -> Self {
         let most = most.clamp(1, Semaphore::MAX_PERMITS);
@@ -49,7 +49,7 @@ impl Pace {
         if let Ok(permit) = self.permits.acquire().await {
             permit.forget();
         }
-        let turn = Permit { pace: self };
+        let turn = Permit { limiter: self };
         let mut at = self.due();
         while at > Instant::now() {
             sleep_until(at.into()).await;
@@ -102,8 +102,8 @@ impl Pace {
 
 impl Drop for Permit<'_> {
     fn drop(&mut self) {
-        let mut state = locked(&self.pace.state);
-        self.pace.give_back(&mut state);
+        let mut state = locked(&self.limiter.state);
+        self.limiter.give_back(&mut state);
     }
 }
 
@@ -111,57 +111,63 @@ impl Drop for Permit<'_> {
 mod tests {
     use std::time::Instant;
 
-    use super::{Duration, Pace, locked};
+    use super::{ConcurrencyLimiter, Duration, locked};
 
     /// The limit of requests in flight, and the free ones of them.
-    fn limit_and_free(pace: &Pace) -> (usize, usize) {
-        (locked(&pace.state).limit, pace.permits.available_permits())
+    fn limit_and_free(limiter: &ConcurrencyLimiter) -> (usize, usize) {
+        (locked(&limiter.state).limit, limiter.permits.available_permits())
     }
 
     #[tokio::test]
     async fn a_rate_limit_halves_the_concurrency_and_successes_raise_it() {
-        let pace = Pace::new(8, Duration::ZERO);
-        let turns = [pace.turn().await, pace.turn().await, pace.turn().await, pace.turn().await, pace.turn().await];
-        pace.too_many();
-        assert_eq!(limit_and_free(&pace), (4, 0));
+        let limiter = ConcurrencyLimiter::new(8, Duration::ZERO);
+        let turns = [
+            limiter.turn().await,
+            limiter.turn().await,
+            limiter.turn().await,
+            limiter.turn().await,
+            limiter.turn().await,
+        ];
+        limiter.too_many();
+        assert_eq!(limit_and_free(&limiter), (4, 0));
         drop(turns);
-        assert_eq!(limit_and_free(&pace), (4, 4), "one of five was over the new limit");
+        assert_eq!(limit_and_free(&limiter), (4, 4), "one of five was over the new limit");
         for _ in 0..4 {
-            pace.good();
+            limiter.good();
         }
-        assert_eq!(limit_and_free(&pace), (5, 5));
+        assert_eq!(limit_and_free(&limiter), (5, 5));
     }
 
     #[tokio::test]
     async fn no_request_starts_during_a_pause() {
-        let (pace, start) = (Pace::new(2, Duration::ZERO), Instant::now());
-        pace.pause(Duration::from_millis(50));
-        pace.pause(Duration::from_millis(1));
-        let turns = [pace.turn().await, pace.turn().await];
+        let (limiter, start) = (ConcurrencyLimiter::new(2, Duration::ZERO), Instant::now());
+        limiter.pause(Duration::from_millis(50));
+        limiter.pause(Duration::from_millis(1));
+        let turns = [limiter.turn().await, limiter.turn().await];
         assert!(start.elapsed() >= Duration::from_millis(50));
         drop(turns);
-        assert_eq!(limit_and_free(&pace), (2, 2));
+        assert_eq!(limit_and_free(&limiter), (2, 2));
     }
 
     #[tokio::test]
     async fn requests_keep_the_rate_of_the_account() {
-        let (pace, start) = (Pace::new(8, Duration::from_millis(20)), Instant::now());
+        let (limiter, start) = (ConcurrencyLimiter::new(8, Duration::from_millis(20)), Instant::now());
         for _ in 0..6 {
-            drop(pace.turn().await);
+            drop(limiter.turn().await);
         }
         assert!(start.elapsed() >= Duration::from_millis(100), "six requests, 20 ms apart: {:?}", start.elapsed());
     }
 
     #[tokio::test]
     async fn one_request_is_always_allowed_and_the_most_is_kept() {
-        let pace = Pace::new(2, Duration::ZERO);
+        let limiter = ConcurrencyLimiter::new(2, Duration::ZERO);
         for _ in 0..5 {
-            pace.too_many();
+            limiter.too_many();
         }
-        assert_eq!(limit_and_free(&pace), (1, 1));
+        assert_eq!(limit_and_free(&limiter), (1, 1));
         for _ in 0..9 {
-            pace.good();
+            limiter.good();
         }
-        assert_eq!(limit_and_free(&pace), (2, 2));
+        assert_eq!(limit_and_free(&limiter), (2, 2));
     }
 }

@@ -21,8 +21,8 @@ use serde_json::Value;
 pub(super) use waiting::Waiting;
 
 use super::models::Backend;
-use super::wire_format::{Dialect, ModelAnswer};
-use concurrency::{Pace, Permit};
+use super::wire_format::{ModelAnswer, WireFormat};
+use concurrency::{ConcurrencyLimiter, Permit};
 use failure::{Failure, broken, failed, no_answer, server};
 use mirrorstats_agents::secrets::Secret;
 pub use preflight::Unreachable;
@@ -79,10 +79,10 @@ pub struct Received {
 pub struct Provider {
     client: Client,
     url: Url,
-    dialect: Dialect,
+    wire_format: WireFormat,
     secret: Option<Secret>,
     patience: Patience,
-    pace: Pace,
+    limiter: ConcurrencyLimiter,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -123,7 +123,7 @@ impl Provider {
     /// A provider at a base address; without a secret, requests carry no key (local servers).
     pub fn new(
         base_url: &str,
-        dialect: Dialect,
+        wire_format: WireFormat,
         model: &str,
         secret: Option<Secret>,
         patience: Patience,
@@ -133,21 +133,28 @@ impl Provider {
             Some(secret) => secret.without(&text),
             None => text,
         };
-        let url = address(base_url, &dialect.path(model)).map_err(|error| match error {
+        let url = address(base_url, &wire_format.path(model)).map_err(|error| match error {
             SetupError::Address { url, fault } => SetupError::Address { url: shown(url), fault: shown(fault) },
             other => other,
         })?;
         // Fails if the process already has a provider, which serves as well.
         let _ = rustls::crypto::ring::default_provider().install_default();
         let client = Client::builder()
-            .default_headers(headers(dialect, secret.as_ref())?)
+            .default_headers(headers(wire_format, secret.as_ref())?)
             .connect_timeout(patience.connect_timeout)
             .timeout(patience.timeout)
             .redirect(reqwest::redirect::Policy::none())
             .user_agent(concat!("mirrorstats/", env!("CARGO_PKG_VERSION")))
             .build()
             .map_err(|fault| SetupError::Client(fault.to_string()))?;
-        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once, patience.interval) })
+        Ok(Self {
+            client,
+            url,
+            wire_format,
+            secret,
+            patience,
+            limiter: ConcurrencyLimiter::new(at_once, patience.interval),
+        })
     }
 
     /// Opens a connection to the address and closes it again without sending anything.
@@ -165,7 +172,7 @@ impl Provider {
     }
 
     pub async fn turn(&self) -> Permit<'_> {
-        self.pace.turn().await
+        self.limiter.turn().await
     }
 
     /// Sends a request once, in its turn.
@@ -173,9 +180,9 @@ impl Provider {
         let result = self.exchange(body).await;
         drop(turn);
         match &result {
-            Ok(_) => self.pace.good(),
+            Ok(_) => self.limiter.good(),
             Err(failure) if failure.kind.is_busy() => {
-                self.pace.too_many();
+                self.limiter.too_many();
                 self.pause(failure.after);
             }
             Err(_) => {}
@@ -187,7 +194,7 @@ impl Provider {
     /// recording instead.
     fn pause(&self, wait: Option<Duration>) {
         if let Some(wait) = wait.filter(|wait| *wait <= self.patience.longest_wait) {
-            self.pace.pause(wait);
+            self.limiter.pause(wait);
         }
     }
 
@@ -214,7 +221,7 @@ impl Provider {
         let latency = start.elapsed();
         // A billed answer counts regardless of its content type, or without one.
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
-        let answer = self.dialect.read(&text).map_err(|fault| {
+        let answer = self.wire_format.read(&text).map_err(|fault| {
             server(format!("expected an answer in JSON, found the content type {kind} and: {fault}"))
         })?;
         let answer = answer.ok_or_else(|| no_answer(&self.without_secret(&text)))?;
@@ -229,7 +236,7 @@ impl Provider {
         if !ABOUT_CONTENT.contains(&status) {
             return None;
         }
-        self.dialect.declined(said)
+        self.wire_format.declined(said)
     }
 }
 
@@ -271,13 +278,13 @@ fn address(base_url: &str, path: &str) -> Result<Url, SetupError> {
     }
 }
 
-fn headers(dialect: Dialect, secret: Option<&Secret>) -> Result<HeaderMap, SetupError> {
+fn headers(wire_format: WireFormat, secret: Option<&Secret>) -> Result<HeaderMap, SetupError> {
     let mut headers = HeaderMap::new();
-    for (name, value) in dialect.headers() {
+    for (name, value) in wire_format.headers() {
         headers.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
     }
     if let Some(secret) = secret {
-        let (name, prefix) = dialect.key_header();
+        let (name, prefix) = wire_format.key_header();
         headers.insert(HeaderName::from_static(name), key_header(prefix, secret).ok_or(SetupError::Key)?);
     }
     Ok(headers)
@@ -292,12 +299,13 @@ fn key_header(prefix: &str, secret: &Secret) -> Option<HeaderValue> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Backend, Dialect, SetupError, address, check_transport};
+    use super::{Backend, SetupError, WireFormat, address, check_transport};
 
     #[test]
     fn keys_are_sent_over_plain_http_only_if_the_backend_allows_it() {
-        let (dialect, key) = (Dialect::OpenaiCompatible, "KEY".to_owned());
-        let strict = Backend { dialect, base_url: None, key, plain_http: false, extra_body: serde_json::Map::new() };
+        let (wire_format, key) = (WireFormat::OpenaiCompatible, "KEY".to_owned());
+        let strict =
+            Backend { wire_format, base_url: None, key, plain_http: false, extra_body: serde_json::Map::new() };
         let free = Backend { plain_http: true, ..strict.clone() };
         for own in [
             "http://127.0.0.1:8/v1",

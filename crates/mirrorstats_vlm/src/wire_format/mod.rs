@@ -1,6 +1,6 @@
 //! The wire formats of providers: requests as JSON, and the content of answers.
 //!
-//! Rule: pure. A dialect knows the shape of bodies and the names of headers; it sends nothing and holds no key. Bodies
+//! Rule: pure. A wire format knows the shape of bodies and the names of headers; it sends nothing and holds no key. Bodies
 //! contain exactly what the provider's own client library sends for the same call. The frame always precedes the words
 //! of the user prompt: the paper's prompt names it first, and Anthropic and Google advise it.
 
@@ -16,10 +16,10 @@ use serde_json::Value;
 use mirrorstats_agents::reply::{Ending, Repair, has_object, without_lone_surrogates};
 use mirrorstats_exact::names;
 
-/// A language.
+/// The shape of requests and answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Dialect {
+pub enum WireFormat {
     /// `OpenAI`'s chat completions.
     OpenaiChat,
     /// The same as other servers take it: with the older name of the limit of tokens.
@@ -96,7 +96,7 @@ pub struct ModelAnswer {
     pub model: Option<String>,
 }
 
-impl Dialect {
+impl WireFormat {
     /// The path of a request, after the base address.
     pub fn path(self, model: &str) -> String {
         match self {

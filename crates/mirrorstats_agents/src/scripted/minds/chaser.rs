@@ -22,7 +22,7 @@ pub struct Chaser;
 
 impl Script for Chaser {
     fn decide(&mut self, observation: &Observation) -> Move {
-        let mark = HandView::of(observation).mark;
+        let mark = HandView::from_observation(observation).mark;
         let action = mark.map(|_| Action::HandForward);
         let reason = if mark.is_some() { "The mark is ahead." } else { "I see no mark." };
         let words = Words { reasoning: Some(reason.to_owned()), ..Words::default() };

@@ -55,7 +55,7 @@ impl Guesser {
 
     fn pick(&mut self, observation: &Observation) -> Option<Color> {
         let mut colors: Vec<Color> = if self.experiment.asks_for_cube() {
-            View::of(observation).cubes.iter().map(|cube| cube.color).collect()
+            View::from_observation(observation).cubes.iter().map(|cube| cube.color).collect()
         } else {
             self.experiment.layout.palette.clone()
         };

@@ -19,7 +19,7 @@
 use crate::{Observation, Words};
 use mirrorstats_trace::episodes::episode::Action;
 
-use super::super::hand_view::{Eye, FRONT, HandView, Place};
+use super::super::hand_view::{Eye, FRONT, HandView, Spot};
 use super::super::{Move, Script};
 
 /// A step of the hand, m.
@@ -31,7 +31,7 @@ const STOPPED: f64 = FRONT + STEP;
 /// The remaining moves, updated by the moves carried out.
 #[derive(Clone, Debug, Default)]
 pub struct Reacher {
-    mark: Option<Place>,
+    mark: Option<Spot>,
     left: Option<[i32; 2]>,
     ahead: Option<f64>,
     last: Option<Action>,
@@ -56,7 +56,7 @@ impl Reacher {
     }
 
     fn look(&mut self, observation: &Observation) {
-        let (view, eye) = (HandView::of(observation), Eye::of(observation));
+        let (view, eye) = (HandView::from_observation(observation), Eye::from_observation(observation));
         if self.mark.is_none() {
             self.mark = view.mark.map(|patch| eye.place(&patch, FRONT));
         }

@@ -41,7 +41,7 @@ pub(super) struct Extras {
 
 impl PaneLayout<'_> {
     pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
-        let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
+        let stream = |at: u64| Rng::for_run(purpose ^ (PURPOSE + at), seed, run);
         // Separate streams, so that an unused one does not affect the others.
         let mut marks: Vec<WornMark> = Vec::new();
         for (at, mark) in (16_u64..).zip(&self.scene.experiment.marks) {

@@ -101,17 +101,17 @@ pub fn write(options: &Options, folder: &Path, progress: Progress<'_>) -> Result
     make_folder(parent).map_err(unwritable(parent))?;
     let inputs = temporary()?;
     let (found, renamed) = Found::frozen(&options.runs, inputs.path(), folder)?;
-    write_found(options, found, folder, temporary()?, progress).map_err(|error| error.renamed(&renamed))
+    write_found(options, &found, folder, temporary()?, progress).map_err(|error| error.renamed(&renamed))
 }
 
 fn write_found(
     options: &Options,
-    found: Found,
+    found: &Found,
     folder: &Path,
     stage: TemporaryFolder,
     progress: Progress<'_>,
 ) -> Result<usize, ViewError> {
-    let snapshot = Snapshot::of_found(options, &found, 0)?;
+    let snapshot = Snapshot::of_found(options, found, 0)?;
     let mut files = Files {
         stage,
         folder: folder.to_owned(),

@@ -11,7 +11,6 @@ use mirrorstats_exact::replace::{self, is_same_file};
 use mirrorstats_log::read::{episode_hashes, other_episode};
 use mirrorstats_record::replay::again::MOST_RAYS;
 use mirrorstats_record::replay::error::{Divergence, ReplayError};
-use mirrorstats_record::replay::verify::{FramesAnswer, Outputs, RecordedTrace, Recount, ReplayAnswer, frame_path};
 use mirrorstats_record::replay::verify::{FramesAnswer, Outputs, RecordedTrace, ReplayAnswer, frame_path};
 use mirrorstats_trace::footers::renderer::Renderer;
 use mirrorstats_trace::inputs;

@@ -5,10 +5,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mirrorstats_analysis::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_analysis::plan::{Given, PlanRequest, plan};
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::file::{built_in, built_in_names};
-use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
-use mirrorstats_report::plan::{Given, PlanRequest, plan};
 use mirrorstats_score::format::{self, Format};
 use mirrorstats_score::score_traces;
 use mirrorstats_score::vocabulary;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mirrorstats::{FigureFormat, MetricTable};
-use mirrorstats_report::tables::Terminal;
+use mirrorstats_tables::Terminal;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 

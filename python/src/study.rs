@@ -6,10 +6,9 @@ use std::sync::{Arc, OnceLock};
 
 use arrow::array::RecordBatch;
 use mirrorstats::{FigureName, FigureOptions, ReportOptions, StatisticsOptions};
-use mirrorstats_report::changes::Limit;
-use mirrorstats_report::figures::InvalidWidth;
-use mirrorstats_report::gate::{GateFormat, GateOptions};
-use mirrorstats_report::statistics::text::Length;
+use mirrorstats_analysis::gate::{GateFormat, GateOptions};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_figures::InvalidWidth;
 use mirrorstats_study::{LostAs, Question};
 use pyo3::prelude::*;
 
@@ -157,7 +156,7 @@ impl Study {
 
     fn diff(&self, py: Python<'_>, other: &Self) -> PyResult<Answer> {
         let found = py.detach(|| self.inner.diff(&other.inner).map_err(error::of_study))?;
-        let shown = found.changes.render(Limit(LISTED), None);
+        let shown = found.changes.render(LISTED, None);
         let notes = found.notes.iter().map(|note| format!("note: {note}"));
         answer::of(&found.changes, notes.chain([shown]).collect::<Vec<_>>().join("\n"))
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use cast::Cast;
 use mirrorstats_exact::number;
-use mirrorstats_report::figures::{FigureError, FigureName, FigureWidth, Input, draw, sensitivity};
+use mirrorstats_figures::{FigureError, FigureName, FigureWidth, Input, draw, sensitivity};
 use mirrorstats_statistics::intervals::interval::wilson;
 use resvg::usvg::roxmltree::{Document, Node};
 use resvg::usvg::{self, Rect, fontdb};
@@ -185,7 +185,7 @@ fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
 /// The cells: (experiment, model, metric) to n and the full mean, which is empty if undefined.
 fn expected(cast: &Cast) -> BTreeMap<(String, String, String), (String, String)> {
     let cells = &cast.cells;
-    let of_group = |group: &mirrorstats_report::cells::Group| {
+    let of_group = |group: &mirrorstats_score::cells::Group| {
         let key = [0, 1].map(|at| group.key[at].to_string());
         let values = cells.metrics.iter().zip(group.moments.clone());
         let values = values.map(move |(metric, moments)| {
@@ -432,7 +432,7 @@ fn the_order_of_groups_does_not_matter() {
 #[test]
 fn figures_that_cannot_be_drawn_have_a_reason() {
     let check = |found: Result<_, FigureError>, expected: &str| {
-        assert_eq!(found.map(|_: mirrorstats_report::figures::Figure| ()).unwrap_err().to_string(), expected);
+        assert_eq!(found.map(|_: mirrorstats_figures::Figure| ()).unwrap_err().to_string(), expected);
     };
     let cast = cast::paper();
     let bare = Input::of_cells(&cast.cells);

@@ -3,8 +3,8 @@
 #![expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 
 use indexmap::IndexMap;
+use mirrorstats_analysis::statistics::{Options, Sequential, Verdict};
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use mirrorstats_report::statistics::{Options, Sequential, Verdict};
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 
 use crate::assert_shown;

@@ -6,12 +6,12 @@ mod losses;
 mod units;
 
 use indexmap::IndexMap;
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
-use mirrorstats_report::cells::interval::ranges;
-use mirrorstats_report::cells::{Cells, Group, KeyValue};
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
+use mirrorstats_score::cells::interval::ranges;
+use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_score::quality::CellKey;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
@@ -204,7 +204,7 @@ fn cells_carry_counts_and_the_intervals_of_their_kind() {
     let found = statistics(&study());
     let cell = |experiment: &str, model: &str, metric: &str| {
         let key = [("experiment", experiment), ("model", model)];
-        let is_it = |cell: &&mirrorstats_report::statistics::CellRow| {
+        let is_it = |cell: &&mirrorstats_analysis::statistics::CellRow| {
             cell.metric == metric && key.iter().all(|(name, value)| cell.key[*name] == KeyValue::Text((*value).into()))
         };
         found.cells.iter().find(is_it).unwrap()

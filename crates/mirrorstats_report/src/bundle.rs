@@ -11,15 +11,16 @@ use std::path::{Component, Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::cells::{Cell, Cells};
-use crate::figures::FigureName;
 use crate::layout::MetricTable;
+use crate::layout::key_field;
 use crate::style::Style;
-use crate::tables::{ListTable, Table, key_field};
 use mirrorstats_exact::hash;
 use mirrorstats_exact::number::full_precision;
 use mirrorstats_exact::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
+use mirrorstats_figures::FigureName;
 use mirrorstats_metric::catalogs::catalog::Catalog;
+use mirrorstats_score::cells::{Cell, Cells};
+use mirrorstats_tables::{ListTable, Table};
 
 /// The name of the manifest, which is written last.
 pub const MANIFEST: &str = "manifest.json";

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::cli::Failure;
 use crate::cli::scoring::read_plan;
-use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_analysis::plan::register::{NamedHash, RegisteredPlan};
 use mirrorstats_trace::footers::declared::Registration;
 use mirrorstats_world::agent::prompt;
 use mirrorstats_world::sim::config::WorldConfig;

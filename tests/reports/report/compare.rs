@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use mirrorstats_report::comparison::{PublishedComparison, choose, compare};
-use mirrorstats_report::errata::Errata;
+use mirrorstats_report::published::comparison::{PublishedComparison, choose, compare};
+use mirrorstats_report::published::errata::Errata;
 use mirrorstats_report::published::{Published, read};
 use mirrorstats_report::style::Style;
 

@@ -1,8 +1,8 @@
 //! Comparisons that follow from the declared design: pairs, clusters, conditions, strata.
 
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
 use mirrorstats_metric::catalogs::catalog::Control;
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
 use mirrorstats_statistics::design::{Cluster, Design, DesignKind};
 
 use super::{
@@ -222,7 +222,7 @@ fn declared_controls_decide_which_experiments_and_metrics_are_contrasted() {
     let rows = [block("E1", "a", 7, 9), block("E2", "a", 21, 9), block("E5", "a", 7, 9)].concat();
     let of = |found: &Statistics| -> Vec<[String; 3]> {
         let names =
-            |it: &mirrorstats_report::statistics::Contrast| [&it.baseline, &it.against, &it.metric].map(Clone::clone);
+            |it: &mirrorstats_analysis::statistics::Contrast| [&it.baseline, &it.against, &it.metric].map(Clone::clone);
         found.conditions.iter().map(names).collect()
     };
     let mut table = labelled(&rows, "scene", by_place);

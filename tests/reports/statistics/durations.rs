@@ -1,7 +1,7 @@
 //! Durations are compared by restricted means. Intervals are given only where their coverage is as promised.
 
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Intervals, Options, Statistics};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Intervals, Options, Statistics};
 use mirrorstats_statistics::intervals::coverage::{self, Withheld};
 use mirrorstats_statistics::intervals::interval::Interval;
 
@@ -32,7 +32,7 @@ fn chance_is_tested_among_finished_episodes_too() {
     };
     let changed = of("TSA").filter(|row| {
         let same =
-            |other: &&mirrorstats_report::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
+            |other: &&mirrorstats_analysis::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)
     });
     assert_eq!((of("TSA").count(), changed.count()), (32, 6));

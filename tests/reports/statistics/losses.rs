@@ -1,7 +1,7 @@
 //! Lost episodes, filters and pooling are reported with the verdicts that they affect.
 
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};
 use mirrorstats_score::quality::CellKey;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 

@@ -1,7 +1,7 @@
 //! Scenes, seeds or participants with several episodes count once each.
 
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
 
 use super::{CLUSTERED, RECORDED, Row, by_place, cells, labelled, with_scenes};
 

@@ -5,7 +5,7 @@ use polars::prelude::{Column, DataFrame, IntoLazy as _, LazyFrame};
 use super::frame::{self, FrameColumn};
 use super::run::PolarsError;
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_report::cells::{Cell, Cells, KeyValue};
+use mirrorstats_score::cells::{Cell, Cells, KeyValue};
 use mirrorstats_score::tables::select::{is_of_coders, truths_of};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, MetricColumn};
 use mirrorstats_score::vocabulary::kind_in;

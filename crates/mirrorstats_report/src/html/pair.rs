@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use indexmap::IndexSet;
 use serde_json::{Value as Json, json};
 
-use crate::statistics::Statistics;
-use crate::statistics::text::pairs::{FamilyText, PairText, families};
-use crate::statistics::text::percent;
+use mirrorstats_analysis::statistics::Statistics;
+use mirrorstats_analysis::statistics::text::pairs::{FamilyText, PairText, families};
+use mirrorstats_analysis::statistics::text::percent;
 use mirrorstats_exact::escape::visible;
 
 /// The most tests in a page, about 700 kB: fifty models have more than a thousand pairs under each metric.

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use crate::error::StudyError;
 use crate::results::Results;
+use mirrorstats_figures::{Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle::OutputFile;
-use mirrorstats_report::cells::Cells;
-use mirrorstats_report::cells::group::{DEFAULT_BY, group};
-use mirrorstats_report::figures::{self, Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
 use mirrorstats_report::html;
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::Cells;
+use mirrorstats_score::cells::group::{DEFAULT_BY, group};
 
 /// The options of a figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +80,7 @@ impl<'a> FigureInputs<'a> {
     }
 
     pub(crate) fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
-        figures::draw(name, &self.input())
+        mirrorstats_figures::draw(name, &self.input())
     }
 
     pub(crate) fn draw_all(&self) -> Drawings {

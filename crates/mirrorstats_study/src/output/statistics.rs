@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mirrorstats_analysis::plan::departures::Looks;
+use mirrorstats_analysis::statistics::{Options, Selection, Sequential, Statistics};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_metric::names::is_about;
-use mirrorstats_report::cells::Cells;
-use mirrorstats_report::plan::departures::Looks;
-use mirrorstats_report::statistics::{Options, Selection, Sequential, Statistics};
+use mirrorstats_score::cells::Cells;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{CONDITION, EpisodeTable};
 use mirrorstats_score::vocabulary;

@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
+use mirrorstats_figures::e5_outcomes::Outcomes;
+use mirrorstats_figures::{FigureName, gaze};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle;
-use mirrorstats_report::cells::group::CONDITION;
-use mirrorstats_report::figures::e5_outcomes::Outcomes;
-use mirrorstats_report::figures::{FigureName, gaze};
+use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::quality::QualityByCell;
 use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
 use mirrorstats_score::timeline::Timeline;

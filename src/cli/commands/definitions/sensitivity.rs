@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::replace::Content;
-use mirrorstats_report::figures::FigureFormat;
+use mirrorstats_figures::FigureFormat;
 use mirrorstats_study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
 
 /// Show how every cell depends on the threshold of mirror evidence, and where a conclusion changes

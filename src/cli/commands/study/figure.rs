@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
-use mirrorstats_report::figures::{FigureFormat, FigureName, FigureWidth};
+use mirrorstats_figures::{FigureFormat, FigureName, FigureWidth};
 use mirrorstats_study::{FigureOptions, MANY_MODELS};
 
 /// Draw one figure.

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs, number};
 use crate::cli::scoring::with_plan;
 use crate::cli::{Failure, Outcome, output, terminal};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Options, Sequential, Statistics};
 use mirrorstats_exact::suggest::hint;
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Options, Sequential, Statistics};
 
 const ALL: &str = "all";
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
-use mirrorstats_report::errata::{Errata, ErrataError};
+use mirrorstats_report::published::errata::{Errata, ErrataError};
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";

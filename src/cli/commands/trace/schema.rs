@@ -7,7 +7,7 @@ use schemars::schema_for;
 use serde_json::{Value, json};
 
 use crate::cli::{Failure, Outcome, terminal};
-use mirrorstats_report::tables::Table;
+use mirrorstats_tables::Table;
 use mirrorstats_trace::import;
 use mirrorstats_trace::schema::Column;
 use mirrorstats_trace::schema::describe::SchemaDocument;

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
-use mirrorstats_report::figures::{Figure, FigureFormat};
+use mirrorstats_figures::{Figure, FigureFormat};
 use mirrorstats_trace::inputs;
 use mirrorstats_world::replay::film_strip::{Steps, Strip};
 

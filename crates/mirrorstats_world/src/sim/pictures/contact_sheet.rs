@@ -15,7 +15,7 @@ use super::super::model::ModelError;
 use super::super::placement::Crowded;
 use super::super::scene::Scene;
 use super::super::world::World;
-use mirrorstats_report::figures::kit::convert::{self, ConvertError};
+use mirrorstats_figures::kit::convert::{self, ConvertError};
 use mirrorstats_trace::episodes::frame::Frame;
 
 /// The scale of pictures on the sheet: pixels per pixel of the sheet, along each side.

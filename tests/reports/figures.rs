@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use cast::Cast;
 use mirrorstats_exact::number;
-use mirrorstats_figures::{FigureError, FigureName, FigureWidth, Input, draw, sensitivity};
+use mirrorstats_figures::{FigureError, FigureName, FigureWidth, Input, draw};
 use mirrorstats_statistics::intervals::interval::wilson;
 use resvg::usvg::roxmltree::{Document, Node};
 use resvg::usvg::{self, Rect, fontdb};
@@ -66,34 +66,6 @@ fn check_texts(label: &str, svg: &str) {
         for (others, other) in &texts[at + 1..] {
             assert!(!overlap(*ink, *other), "{label}: `{words}` over `{others}`: {ink:?} {other:?}");
         }
-    }
-}
-
-/// Checks the figure of thresholds with the same cells for each threshold.
-fn check_thresholds(label: &str, cast: &Cast, px: &[u32]) {
-    let px = [None].into_iter().chain(px.iter().copied().map(Some));
-    let stages: Vec<_> = px.map(|px| sensitivity::Stage { px, cells: &cast.cells }).collect();
-    let metrics = ["MCR", "CR", "TTD", "MTATO"].map(str::to_owned);
-    let reference = "recorded (60 and 1000 px)";
-    let input = sensitivity::SensitivityInput { stages: &stages, metrics: &metrics, order: &[], reference };
-    let svg = sensitivity::draw(&input).unwrap().inline_svg();
-    check_texts(&format!("sensitivity {label}"), &svg);
-    let known = cast.cells.groups.iter().flat_map(|group| cast.cells.metrics.iter().zip(&group.moments));
-    let known = known.filter(|(metric, moments)| metrics.contains(metric) && moments.n > 0).count();
-    assert_eq!(svg.matches("data-threshold=").count(), known * stages.len(), "{label}");
-}
-
-#[test]
-fn no_text_of_thresholds_leaves_the_frame_or_overlaps_another() {
-    for count in [1, 8, 20] {
-        let cast = cast::made_up(&cast::names(count, 17));
-        for px in [&[60][..], &[1, 10, 30, 60, 120, 240], &[1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 20_000, 100_000]]
-        {
-            check_thresholds(&format!("{count} {px:?}"), &cast, px);
-        }
-    }
-    for kept in [&["E1"][..], &["E1", "E4"], &["E1", "E2", "E3"]] {
-        check_thresholds(&format!("{kept:?}"), &cast::paper().without(|e, _| !kept.contains(&e)), &[1, 60, 240]);
     }
 }
 

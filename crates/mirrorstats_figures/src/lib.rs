@@ -10,7 +10,6 @@ pub mod e5_outcomes;
 pub mod film_strip;
 pub mod gaze;
 pub mod kit;
-pub mod sensitivity;
 pub mod shown;
 
 mod completion_gap;

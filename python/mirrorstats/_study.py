@@ -258,7 +258,6 @@ class Study:
         *,
         style: Style = "default",
         metric: Optional[Names] = None,
-        title: Optional[str] = None,
         width: Optional[str] = None,
     ) -> Figure:
         """A figure by name, as `mirrorstats figure`.
@@ -267,7 +266,6 @@ class Study:
             name: the figure.
             style: for the order of the models, and for the metrics and captions of figures.
             metric: the metrics that it shows, one or several in the order of their roles; those of the style if None.
-            title: a heading of its own.
             width: the width on paper from 8 cm to 50 cm, such as `8.5cm`, `85mm`, `3.3in`, `240pt` or `640px`; text has at least
                 6 pt there. As wide as it is drawn if None.
 
@@ -277,10 +275,10 @@ class Study:
 
         Example:
             >>> import mirrorstats as ms
-            >>> ms.open(ms.example_runs()).figure("intervals", metric="CAAL", title="Self-attribution", width="8.5cm")
+            >>> ms.open(ms.example_runs()).figure("intervals", metric="CAAL", width="8.5cm")
             <mirrorstats.Figure: intervals>
         """
-        return self._native.figure(name, self._style(style), _names("metric", metric), title, width)
+        return self._native.figure(name, self._style(style), _names("metric", metric), width)
 
     def query(self, sql: str) -> ArrowTable:
         """The rows of a SELECT over the tables `steps`, `episodes` and `cells`, as `mirrorstats query`.

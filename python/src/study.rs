@@ -113,20 +113,19 @@ impl Study {
         py.detach(|| Ok(self.tables_of(style)?.tables.iter().map(ReportTable::new).collect()))
     }
 
-    #[pyo3(signature = (name, style, metrics, title, width))]
+    #[pyo3(signature = (name, style, metrics, width))]
     fn figure(
         &self,
         py: Python<'_>,
         name: &str,
         style: String,
         metrics: Option<Vec<String>>,
-        title: Option<String>,
         width: Option<&str>,
     ) -> PyResult<Figure> {
         let name = FigureName::from_str(name).map_err(error::of_argument)?;
         let width = width.map(str::parse).transpose();
         let width = width.map_err(|fault: InvalidWidth| error::of_argument(format!("width: {fault}")))?;
-        let options = FigureOptions { style: style.into(), metrics, title, width, top: None };
+        let options = FigureOptions { style: style.into(), metrics, width, top: None };
         let figure = py.detach(|| self.inner.figure(name, &options).map_err(error::of_study))?;
         Ok(Figure::new(figure, name.name()))
     }

@@ -185,16 +185,3 @@ fn the_first_fault_is_the_same_for_any_number_of_threads() {
         assert_eq!(told(threads, &backwards.join("\n")), expected);
     }
 }
-
-#[test]
-fn faults_of_a_list_of_errata_are_reported_once_with_their_lines() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("e.toml"), "[[erratum]]\ntable = 'main'\nfield = 'median'\n").unwrap();
-    let table = repository().join("fixtures/published/main_table.csv");
-    let paper = repository().join("fixtures/paper");
-    let (table, paper) = (table.to_str().unwrap(), paper.to_str().unwrap());
-    let refused =
-        run(folder.path(), &["table", "compare", paper, "--published", table, "--errata", "e.toml"]).refused();
-    assert!(refused.starts_with("error: an erratum needs `experiment`\n --> e.toml:1:1\n"), "{refused}");
-    assert!(refused.contains("did you mean `mean`?") && !refused.contains("error: error"), "{refused}");
-}

@@ -14,7 +14,6 @@ use mirrorstats_metric::shape::DefinitionFile;
 use mirrorstats_report::bundle::Manifest;
 use mirrorstats_report::published::audit::Audit;
 use mirrorstats_report::published::comparison::PublishedComparison;
-use mirrorstats_report::published::errata::Errata;
 use mirrorstats_report::sensitivity::Sensitivity;
 use mirrorstats_report::style::StyleSheet;
 use mirrorstats_score::evidence::Evidence;
@@ -46,7 +45,6 @@ fn current() -> Vec<(&'static str, Value)> {
         ("definitions", json!(schema_for!(DefinitionFile))),
         ("diff", printed_schema::<Changes>()),
         ("episode", json!(schema_for!(EpisodeMessage))),
-        ("errata", json!(schema_for!(Errata))),
         ("gate", printed_schema::<Gate>()),
         ("import", printed_schema::<ImportAnswer>()),
         ("info", json!(schema_for!(Info))),

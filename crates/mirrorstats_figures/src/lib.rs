@@ -53,7 +53,6 @@ pub struct Input<'a> {
     pub outcomes: Option<&'a Outcomes>,
     /// Landmarks of each episode, for `gaze`.
     pub timelines: Option<&'a [Timeline]>,
-    pub title: Option<&'a str>,
     /// The printed width; `None` for the width as drawn.
     pub width: Option<FigureWidth>,
 }
@@ -61,16 +60,7 @@ pub struct Input<'a> {
 impl<'a> Input<'a> {
     /// Only cells: enough for all figures except `decision-curve`, `e5-outcomes` and `gaze`.
     pub fn of_cells(cells: &'a Cells) -> Self {
-        Self {
-            cells,
-            order: &[],
-            sheets: &SHOWN,
-            episodes: None,
-            outcomes: None,
-            timelines: None,
-            title: None,
-            width: None,
-        }
+        Self { cells, order: &[], sheets: &SHOWN, episodes: None, outcomes: None, timelines: None, width: None }
     }
 }
 
@@ -104,13 +94,9 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
             gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?)
         }
     };
-    let (sheet, height) = match input.title {
-        Some(title) => sheet.under(title, height),
-        None => (sheet, height),
-    };
     let too_narrow = |least| FigureError::TooNarrow { figure: name, least };
     let printed = input.width.map(|width| width.printed(sheet.width()).map_err(too_narrow)).transpose()?;
-    let title = input.title.map_or_else(|| shown::title(name, &metrics, matrix.catalog()), str::to_owned);
+    let title = shown::title(name, &metrics, matrix.catalog());
     let mut figure = Figure::new(sheet, height, &title, shown::caption(name, &metrics, input.sheets));
     figure.models = matrix.models.len();
     figure.printed = printed;

@@ -55,7 +55,7 @@ pub use mirrorstats_report::layout;
 use mirrorstats_report::layout::MetricTable;
 use mirrorstats_report::published;
 use mirrorstats_report::published::comparison::{PublishedComparison, choose, compare};
-use mirrorstats_report::published::errata::Errata;
+use mirrorstats_report::published::errata;
 use mirrorstats_report::style::{EmphasisRule, Style};
 use mirrorstats_score::cells::Cells;
 use mirrorstats_score::cells::group::group;
@@ -337,24 +337,18 @@ impl Study {
         Ok((one, definitions))
     }
 
-    /// Compares a table of the study with a published one, cell by cell. `table` names it; the default is the first
-    /// table that has all the published metrics. Errors: faults of the published table, the style or the inputs; an
-    /// unknown table.
-    pub fn compare(
-        &self,
-        published: &Path,
-        style: impl AsRef<Path>,
-        table: Option<&str>,
-        errata: &Errata,
-    ) -> Result<PublishedComparison, StudyError> {
+    /// Compares the first table that has all the published metrics with the published one, cell by cell. The paper's
+    /// style knows the slips of the paper's tables. Errors: faults of the published table, the style or the inputs.
+    pub fn compare(&self, published: &Path, style: impl AsRef<Path>) -> Result<PublishedComparison, StudyError> {
         // Small files first: a mistake in them should not cost a scan of the traces.
         let published = published::read(published)?;
+        let errata = if style.as_ref() == Path::new("paper") { errata::of_paper() } else { Vec::new() };
         let style = Style::load(style)?;
         let counted = self.counted(self.score()?);
         let cells = self.cells_of(&counted.results.episodes)?;
         let left_out = (&counted.lost, None);
         let (tables, _) = self.tables(&counted.results.episodes, left_out, &cells, &style)?;
-        Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
+        Ok(compare(choose(&tables, &published, &style)?, &published, &errata))
     }
 
     /// The files that an answer is made from: inputs, definitions and the style, if any. An output must not replace one

@@ -9,8 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::font::{self, Weight};
 use super::frame::{Frame, Point};
-use super::label;
-use super::lettering::{self, Lettering, MARGIN, TextAnchor};
+use super::lettering::{Lettering, TextAnchor};
 use super::look::{Fill, Rgb, Stroke};
 use super::mark::Mark;
 use mirrorstats_exact::format::fixed;
@@ -111,19 +110,6 @@ impl Sheet {
         self.body += &mark.opening();
         draw(self);
         self.body += "</g>\n";
-    }
-
-    /// The content down to `height` px under a heading, and the height of both, px.
-    pub(crate) fn under(self, title: &str, height: f64) -> (Self, f64) {
-        let heading = lettering::heading();
-        let mut sheet = Self::new(self.width);
-        let mut top = MARGIN;
-        for line in label::wrapped(title, self.width - 2.0 * MARGIN, heading) {
-            sheet.text((MARGIN, top + lettering::leading(heading) / 2.0), &line, heading);
-            top += lettering::leading(heading);
-        }
-        let _ = writeln!(sheet.body, "<g transform=\"translate(0 {top})\">\n{}</g>", self.body);
-        (sheet, height + top)
     }
 
     /// The elements that were drawn, as SVG.

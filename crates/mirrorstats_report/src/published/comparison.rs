@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::layout::{MetricCell, MetricRow, MetricTable};
-use crate::published::errata::{Errata, Erratum, Field};
+use crate::published::errata::{Erratum, Field};
 use crate::published::{CellLabel, PrintedCell, Published};
 use crate::style::Style;
 use mirrorstats_exact::escape::visible;
@@ -60,38 +60,28 @@ pub struct Difference {
 pub enum ComparisonError {
     #[error(
         "no table of the style `{style}` has all the published metrics ({metrics}): expected those of {tables}; \
-         name the table with --table, or give another --style"
+         give another --style"
     )]
     NoTable { style: String, metrics: String, tables: String },
-    #[error("the style `{style}` makes no table `{name}` of these scores: expected one of {tables}")]
-    UnknownTable { style: String, name: String, tables: String },
     #[error(
         "the style `{style}` prints no standard errors in its table `{table}`: compare with a style of mean and standard error, such as `paper`"
     )]
     NoStandardErrors { style: String, table: String },
 }
 
-/// The table to compare: the one called `name`, else the first that has all the published metrics.
+/// The table to compare: the first that has all the published metrics.
 pub fn choose<'t>(
     tables: &'t [MetricTable],
     published: &Published,
-    name: Option<&str>,
     style: &Style,
 ) -> Result<&'t MetricTable, ComparisonError> {
     let style = style.name.clone();
     let metrics: BTreeSet<&str> = published.cells.iter().map(|(cell, _)| cell.metric.as_str()).collect();
-    let table = match name {
-        Some(name) => tables.iter().find(|table| table.name == name).ok_or_else(|| ComparisonError::UnknownTable {
-            style: style.clone(),
-            name: name.to_owned(),
-            tables: tables.iter().map(|table| table.name.as_str()).collect::<Vec<_>>().join(", "),
-        })?,
-        None => tables.iter().find(|table| has_all(table, &metrics)).ok_or_else(|| ComparisonError::NoTable {
-            style: style.clone(),
-            metrics: metrics.iter().copied().collect::<Vec<_>>().join(", "),
-            tables: tables.iter().map(described).collect::<Vec<_>>().join(", "),
-        })?,
-    };
+    let table = tables.iter().find(|table| has_all(table, &metrics)).ok_or_else(|| ComparisonError::NoTable {
+        style: style.clone(),
+        metrics: metrics.iter().copied().collect::<Vec<_>>().join(", "),
+        tables: tables.iter().map(described).collect::<Vec<_>>().join(", "),
+    })?;
     let prints_se = table.form == crate::style::CellForm::MeanSe;
     if prints_se { Ok(table) } else { Err(ComparisonError::NoStandardErrors { style, table: table.name.clone() }) }
 }
@@ -105,9 +95,9 @@ fn described(table: &MetricTable) -> String {
     format!("`{}` ({})", table.name, metrics.join(", "))
 }
 
-pub fn compare(table: &MetricTable, published: &Published, errata: &Errata) -> PublishedComparison {
+pub fn compare(table: &MetricTable, published: &Published, errata: &[Erratum]) -> PublishedComparison {
     let ours = our_cells(table);
-    let about_table: Vec<&Erratum> = errata.erratum.iter().filter(|erratum| erratum.table == table.name).collect();
+    let about_table: Vec<&Erratum> = errata.iter().filter(|erratum| erratum.table == table.name).collect();
     let mut used = vec![false; about_table.len()];
     let mut comparison = PublishedComparison {
         table: table.name.clone(),

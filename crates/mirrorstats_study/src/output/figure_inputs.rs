@@ -21,8 +21,6 @@ pub struct FigureOptions {
     pub style: PathBuf,
     /// The metrics shown, in the order of their roles; the style's metrics if None.
     pub metrics: Option<Vec<String>>,
-    /// A custom heading.
-    pub title: Option<String>,
     /// The printed width; the drawn width if None.
     pub width: Option<FigureWidth>,
     /// The number of models to show, the best by their means of the first metric over all experiments; all if None.
@@ -31,7 +29,7 @@ pub struct FigureOptions {
 
 impl Default for FigureOptions {
     fn default() -> Self {
-        Self { style: PathBuf::from("default"), metrics: None, title: None, width: None, top: None }
+        Self { style: PathBuf::from("default"), metrics: None, width: None, top: None }
     }
 }
 
@@ -104,7 +102,6 @@ impl<'a> FigureInputs<'a> {
             episodes: Some(&self.results.episodes),
             outcomes: self.results.outcomes.as_ref(),
             timelines: self.results.timelines.as_deref(),
-            title: self.options.title.as_deref(),
             width: self.options.width,
         }
     }

@@ -311,16 +311,15 @@ class Study:
         """
         return Manifest(self._native.report(text(out, self._spool), self._style(style), figures))
 
-    def stats(self, *, confidence: float = 0.95, horizon: Optional[int] = None, full: bool = False) -> Statistics:
+    def stats(self, *, confidence: float = 0.95, full: bool = False) -> Statistics:
         """Intervals, tests and comparisons of the cells, as `mirrorstats stats --json`; `Statistics` has them as frames too.
 
         Args:
             confidence: of every interval, between 0 and 1; tests are at one minus it.
-            horizon: of restricted means, in steps; the last step known for every model of an experiment if None.
             full: whether the text has every test, not the answers alone.
 
         Raises:
-            ArgumentError: a confidence that is not between 0 and 1, a horizon below 1.
+            ArgumentError: a confidence that is not between 0 and 1.
 
         Example:
             >>> import mirrorstats as ms
@@ -329,8 +328,7 @@ class Study:
             (168, 0.9)
         """
         check_share("confidence", confidence)
-        check_number("horizon", horizon, 1)
-        return Statistics(self._native.stats(confidence, horizon, full))
+        return Statistics(self._native.stats(confidence, full))
 
     def diff(self, other: Study) -> Changes:
         """What changes from this study to another one: cells, and values of episodes, as `mirrorstats diff --json`.

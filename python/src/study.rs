@@ -141,9 +141,9 @@ impl Study {
         answer::of(&written.manifest, [written.files, notes].concat().join("\n"))
     }
 
-    #[pyo3(signature = (confidence, horizon, full))]
-    fn stats(&self, py: Python<'_>, confidence: f64, horizon: Option<i64>, full: bool) -> PyResult<Answer> {
-        let options = StatisticsOptions { confidence, horizon, improvements: true, ..StatisticsOptions::default() };
+    #[pyo3(signature = (confidence, full))]
+    fn stats(&self, py: Python<'_>, confidence: f64, full: bool) -> PyResult<Answer> {
+        let options = StatisticsOptions { confidence, improvements: true, ..StatisticsOptions::default() };
         let found = py.detach(|| self.inner.statistics(&options).map_err(error::of_study))?;
         answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Short }, None))
     }

@@ -143,7 +143,6 @@ fn bad_usage_has_a_problem_and_a_remedy() {
             (&["stats", "a.parquet", "--metric", "TSAA"], &["`TSAA`", "did you mean `TSA`?"]),
             (&["stats", "a.parquet", "--confidence", "95"], &["between 0 and 1", "95"]),
             (&["stats", "a.parquet", "--sequential", "--metric", "TTD"], &["no rate is named `TTD`", "TSA"]),
-            (&["stats", "a.parquet", "--sequential", "--horizon", "50"], &["--horizon", "--sequential"]),
             (&["table", "compare", "a.parquet"], &["--published"]),
             (&["table", "compare", "a.parquet", "--published", "no.csv"], &["no.csv", "No such file"]),
             (&["table", "compare", "a.parquet", "--published", "file"], &["file"]),

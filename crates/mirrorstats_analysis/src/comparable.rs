@@ -109,12 +109,12 @@ fn parts(declared: &Declared, names: [&str; 2], kept: &[&str]) -> Option<String>
         let (one, other) = (&one[**key], &other[**key]);
         one != other && (is_strict || !(one.is_null() || other.is_null()))
     };
-    let told = |key: &&str| match key {
+    let difference = |key: &&str| match key {
         // The renderer is stored unhashed.
         &"renderer" => first_difference(key, &one[*key], &other[*key]).unwrap_or_default(),
         key => format!("{key} ({}, {})", shown(&one[*key]), shown(&other[*key])),
     };
-    let found: Vec<String> = kept.iter().filter(differs).map(told).collect();
+    let found: Vec<String> = kept.iter().filter(differs).map(difference).collect();
     (!found.is_empty()).then(|| found.join(", "))
 }
 

@@ -70,10 +70,10 @@ fn signs(scene: Scene<'_>, metric: MetricId<'_>) -> Vec<(Swatch, String)> {
         }
     }
     let readings: Vec<_> = matrix.pairs().map(|(e, m)| matrix.reading(e, m, metric)).collect();
-    let words = [(Reading::Empty, "none: no episodes"), (Reading::Undefined(0), "--: undefined")];
-    let is_alike = |a: &Reading, b: &Reading| std::mem::discriminant(a) == std::mem::discriminant(b);
-    let seen = words.iter().filter(|(kind, _)| readings.iter().any(|reading| is_alike(reading, kind)));
-    signs.extend(seen.map(|(_, text)| (Swatch::None, (*text).to_owned())));
+    let has_empty = readings.iter().any(|reading| matches!(reading, Reading::Empty));
+    let has_undefined = readings.iter().any(|reading| matches!(reading, Reading::Undefined(_)));
+    let words = [(has_empty, "none: no episodes"), (has_undefined, "--: undefined")];
+    signs.extend(words.into_iter().filter(|(is_seen, _)| *is_seen).map(|(_, text)| (Swatch::None, text.to_owned())));
     signs
 }
 

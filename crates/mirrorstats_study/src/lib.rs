@@ -294,7 +294,7 @@ impl Study {
         }
         if let Some(top) = options.top {
             let metric = options.metrics.iter().flatten().next().cloned();
-            results = results.of_the_best(top, &metric.map_or_else(|| self.leading_metric(), Ok)?);
+            results = results.top_models(top, &metric.map_or_else(|| self.leading_metric(), Ok)?);
         }
         Ok(FigureInputs::of(&results, &style)?.with(options.clone()).draw(name)?)
     }

@@ -64,8 +64,7 @@ pub(super) fn label(results: &mut Results) {
     if let Some(quality) = quality {
         let replies = quality.take_by_episode();
         if !replies.is_empty() {
-            let text =
-                |row| replies.get(episodes.keys.get(row).episode_id).map(|[unusable, all]| format!("{unusable}/{all}"));
+            let text = |row| replies.get(episodes.keys.get(row).episode_id).map(ToString::to_string);
             let values = (0..episodes.len()).map(text).collect();
             episodes.labels.push(LabelColumn { name: UNUSABLE_REPLIES.to_owned(), values });
         }

@@ -128,7 +128,7 @@ pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
                 .to_owned()
         }
     };
-    let mut told = vec![
+    let mut sentences = vec![
         format!("rates: {rates}{why}"),
         pairs,
         clusters,
@@ -136,7 +136,7 @@ pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
         "Holm: the level of the first step, which the smallest p value must meet; later steps ask for less".to_owned(),
     ];
     if let Some(chance) = request.chance {
-        told.push(format!("chance: the true rate is {chance} and the difference above it"));
+        sentences.push(format!("chance: the true rate is {chance} and the difference above it"));
     }
-    told
+    sentences
 }

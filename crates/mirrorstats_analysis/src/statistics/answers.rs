@@ -172,8 +172,8 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
     }
     let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
     let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", units.counted()));
-    let told = format!("{about} {}{below}", names(&above, rows.len()));
-    [told].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
+    let verdicts = format!("{about} {}{below}", names(&above, rows.len()));
+    [verdicts].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
 }
 
 fn names(models: &[String], all: usize) -> String {
@@ -241,8 +241,9 @@ fn differing_in(family: &Family, confidence: f64) -> String {
     };
     let unsaid: Vec<String> = comparisons.iter().copied().filter(is_silent).filter_map(reason).collect();
     let unsettled = unsaid_pairs(&unsaid);
-    let told = differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
-    [told + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
+    let differing =
+        differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
+    [differing + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
 }
 
 /// The separated pairs, grouped by the better model; `all` is the number of pairs.

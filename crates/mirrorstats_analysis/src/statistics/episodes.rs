@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::study::RowKey;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
-use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES};
+use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, UNUSABLE_REPLIES, UnusableCount};
 
 /// The most cells that a sentence names; others are counted.
 const NAMED_CELLS: usize = 3;
@@ -41,29 +41,22 @@ impl Replies {
     pub fn of(table: &EpisodeTable) -> Option<Self> {
         let label = table.label(UNUSABLE_REPLIES)?;
         let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
-        let mut cells: BTreeMap<(&str, &str, Option<&str>), [u64; 2]> = BTreeMap::new();
+        let mut cells: BTreeMap<(&str, &str, Option<&str>), UnusableCount> = BTreeMap::new();
+        let mut all = UnusableCount::default();
         for (row, key) in table.keys.iter().enumerate() {
-            let Some((unusable, all)) = label.get(row).and_then(|text| text.split_once('/')) else { continue };
+            let Some(found) = label.get(row).and_then(UnusableCount::of_label) else { continue };
             let condition = conditions.and_then(|conditions| conditions.get(row));
-            let counts = cells.entry((key.experiment, key.model, condition)).or_default();
-            for (count, text) in counts.iter_mut().zip([unusable, all]) {
-                *count += text.parse::<u64>().unwrap_or(0);
-            }
+            cells.entry((key.experiment, key.model, condition)).or_default().add(found);
+            all.add(found);
         }
-        let sum = |at: usize| cells.values().map(|counts| counts[at]).sum::<u64>();
-        let (unusable, replies) = (sum(0), sum(1));
-        let cells = cells.iter().filter(|(_, [unusable, _])| *unusable > 0);
-        let cells = cells.map(|(&(experiment, model, condition), &[unusable, replies])| UnusableReplies {
-            key: RowKey {
-                experiment: experiment.to_owned(),
-                model: model.to_owned(),
-                condition: condition.map(str::to_owned),
-            },
-            replies,
-            unusable,
-        });
-        let cells = cells.collect();
-        (replies > 0).then_some(Self { replies, unusable, cells })
+        let cells =
+            cells.into_iter().filter(|(_, count)| count.unusable > 0).map(|((experiment, model, condition), count)| {
+                let (experiment, model, condition) =
+                    (experiment.to_owned(), model.to_owned(), condition.map(str::to_owned));
+                let UnusableCount { unusable, replies } = count;
+                UnusableReplies { key: RowKey { experiment, model, condition }, replies, unusable }
+            });
+        (all.replies > 0).then_some(Self { replies: all.replies, unusable: all.unusable, cells: cells.collect() })
     }
 
     /// The number of replies without a decision, and the cells with the largest shares; `None` without any.

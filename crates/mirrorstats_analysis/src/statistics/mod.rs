@@ -151,10 +151,10 @@ impl Statistics {
     pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::of(table, options.design, options.lost.as_ref())?;
         study.pool = options.pooled.is_some();
-        let (confidence, horizon) = (options.confidence, options.horizon);
+        let confidence = options.confidence;
         let headline = conclusions::headline(&study);
         let asked: &[String] = if options.improvements { &headline } else { &[] };
-        let (models, gaps) = models::compared(&study, horizon, confidence);
+        let (models, gaps) = models::compared(&study, confidence);
         let overall = overall::rates(&study, &headline, confidence);
         let mut statistics = Self {
             definitions: table.catalog.name.clone(),
@@ -172,10 +172,10 @@ impl Statistics {
             overall,
             improvements: overall::improvements(&study, asked, confidence),
             gaps,
-            conditions: Contrast::all(&study, horizon, confidence),
+            conditions: Contrast::all(&study, confidence),
             trends: TrendRow::all(&study, &headline, confidence),
             clusters: ClusterRow::all(&study, confidence),
-            durations: DurationRow::all(&study, horizon, confidence),
+            durations: DurationRow::all(&study, confidence),
             retests: RetestRow::all(&study),
             losses: Losses::of(&study, options.lost.is_some(), confidence),
             replies: options.replies.clone(),

@@ -12,8 +12,6 @@ use mirrorstats_statistics::design::Design;
 pub struct Options {
     /// The confidence of every interval, and one minus the level of every test; between 0 and 1.
     pub confidence: f64,
-    /// The horizon of restricted means in steps; by default the last step known for every model.
-    pub horizon: Option<i64>,
     /// The number of lost episodes besides those given; `None` if the traces do not record it.
     pub lost: Option<LostCounts>,
     /// The declared design; empty by default.
@@ -36,7 +34,6 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             confidence: CONFIDENCE,
-            horizon: None,
             lost: None,
             design: Design::default(),
             selection: None,

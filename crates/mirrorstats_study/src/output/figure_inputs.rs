@@ -68,7 +68,7 @@ impl<'a> FigureInputs<'a> {
         let models: BTreeSet<&str> = all.results.episodes.keys.iter().map(|key| key.model).collect();
         let Some((metric, _)) = metric.filter(|_| models.len() > MANY_MODELS) else { return Ok(all) };
         let remark = format!("The best {SHOWN_OF_MANY} of {} models by {metric}.", models.len());
-        let results: Cow<'_, Results> = Cow::Owned(all.results.into_owned().of_the_best(SHOWN_OF_MANY, metric));
+        let results: Cow<'_, Results> = Cow::Owned(all.results.into_owned().top_models(SHOWN_OF_MANY, metric));
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
         Ok(Self { cells, style, options: FigureOptions::default(), results, remark: Some(remark) })
     }

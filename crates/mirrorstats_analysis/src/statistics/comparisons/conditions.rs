@@ -73,13 +73,13 @@ impl Contrast {
         named(&self.model, self.condition.as_deref())
     }
 
-    pub(crate) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut contrasts = Vec::new();
         for pair in Self::pairs(study) {
             let (mut family, columns) = (Vec::new(), pair.columns(study));
             for (first, second) in pair.couples() {
                 let matched = Matched::of(&Scenes::of(study, first), &Scenes::of(study, second));
-                let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
+                let compared = Compared { study, first, second, matched: &matched, horizon: None, confidence };
                 let incomparable = study.incomparable(first, second);
                 let under = |column: &MetricColumn| Self {
                     model: first.model.to_owned(),

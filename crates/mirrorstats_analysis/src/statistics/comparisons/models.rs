@@ -134,14 +134,14 @@ fn triangle(count: usize, a: usize, b: usize) -> usize {
     a * (2 * count - a - 1) / 2 + (b - a - 1)
 }
 
-pub(crate) fn compared(study: &Study, horizon: Option<i64>, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
+pub(crate) fn compared(study: &Study, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
     let (mut families, mut gaps) = (Vec::new(), Vec::new());
     for experiment in study.experiments.iter().filter(|experiment| experiment.blocks.len() > 1) {
         let field = MatchedBlocks::of(study, experiment);
         for column in &study.table.metrics {
             if is_duration(study, &column.name) {
                 // Models are ordered and compared up to one horizon, the one in the table of durations.
-                let horizon = horizon.or_else(|| durations::horizon_of(study, experiment, column));
+                let horizon = durations::horizon_of(study, experiment, column);
                 families.push(Family::of(experiment.name, column, &field, (horizon, confidence)));
             } else if study.kind(&column.name) == Kind::Rate {
                 families.push(Family::of(experiment.name, column, &field, (None, confidence)));

@@ -27,7 +27,7 @@ pub struct DurationRow {
     pub median: Option<i64>,
     /// The steps that this may be (Brookmeyer and Crowley).
     pub median_interval: Option<MedianInterval>,
-    /// The mean up to the horizon, which is the same for all models of the experiment unless it was given.
+    /// The mean up to the horizon, which is the same for all models of the experiment.
     pub restricted: Option<RestrictedMean>,
     /// The reason why the restricted mean has no interval.
     pub withheld: Option<Withheld>,
@@ -88,15 +88,14 @@ fn curve(study: &Study, block: &Block, column: &MetricColumn) -> Option<Survival
 }
 
 impl DurationRow {
-    /// Every censored duration of the table, up to `horizon`, by default the last step at which every model's curve is
-    /// known.
-    pub(crate) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
+    /// Every censored duration of the table, up to the last step at which every model's curve is known.
+    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let durations = study.relations.durations.iter().filter(|(duration, _)| is_duration(study, duration));
         let columns: Vec<&MetricColumn> = durations.filter_map(|(duration, _)| study.column(duration)).collect();
         let mut rows = Vec::new();
         for column in columns {
             for experiment in &study.experiments {
-                let horizon = horizon.or_else(|| horizon_of(study, experiment, column));
+                let horizon = horizon_of(study, experiment, column);
                 let of = |block| Self::of(study, block, column, horizon, confidence);
                 rows.extend(experiment.blocks.iter().map(of));
             }

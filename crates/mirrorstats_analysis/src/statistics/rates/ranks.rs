@@ -91,7 +91,7 @@ impl Ranks {
         let mut study = Study::of(table, design, Some(lost))?;
         study.pool = pool;
         let overall = overall::rates(&study, &headline(&study), CONFIDENCE);
-        Ok(Self(RankRow::all(&compared(&study, None, CONFIDENCE).0, &overall)))
+        Ok(Self(RankRow::all(&compared(&study, CONFIDENCE).0, &overall)))
     }
 
     /// Returns true if a model is tied for the best, and some other model is not.

@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 
 use crate::assert_shown;
-use crate::harness::files::repository;
 use crate::{contents, fixture, run, run_with_input, two_files};
 
 /// Damage in columns that the paper's definitions do not read; only `validate` finds it.

@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 
 use mirrorstats::Study;
-use mirrorstats_exact::number::full_precision;
 use mirrorstats_study::Thresholds;
 use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::write::write_episodes;
@@ -132,10 +131,6 @@ fn compare(inputs: &str, px: u32) {
         }
     }
     assert_eq!(compared, report.found.cells.len());
-    let svg = report.figure.svg();
-    let known = report.found.cells.iter().filter_map(|cell| cell.mean);
-    assert_eq!(svg.matches("data-threshold=").count(), known.clone().count());
-    assert!(known.clone().all(|mean| svg.contains(&format!("data-value=\"{}\"", full_precision(mean)))));
 }
 
 proptest! {

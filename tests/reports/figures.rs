@@ -103,10 +103,9 @@ fn smallest(svg: &str) -> f64 {
 fn text_is_legible_and_in_the_frame_at_every_width() {
     let casts = [("paper", cast::paper()), ("9 x 40", cast::made_up(&cast::names(9, 40)))];
     for (width, px) in [("8cm", 302.36), ("120mm", 453.54), ("9in", 864.0)] {
-        let title = "Self-identification of eight models in a world with one mirror and a second body";
         for (label, cast) in &casts {
             for name in FigureName::ALL {
-                let input = Input { width: Some(width.parse().unwrap()), title: Some(title), ..cast.input() };
+                let input = Input { width: Some(width.parse().unwrap()), ..cast.input() };
                 let label = format!("{name} {label} {width}");
                 let svg = draw(name, &input).unwrap_or_else(|error| panic!("{label}: {error}")).inline_svg();
                 check_texts(&label, &svg);

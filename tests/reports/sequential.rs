@@ -92,7 +92,7 @@ fn with_scenes(blocks: &[Block], repeats: i32, scene: impl Fn(&str, i32) -> Opti
             MetricColumn::new("MCR", rows().map(|(_, at)| (at > 0).then_some(1))),
         ],
     };
-    Sequential::of(&table, &Options::default()).unwrap()
+    Sequential::from_table(&table, &Options::default()).unwrap()
 }
 
 // The e-values and bounds are those in the tests of `stats::sequential`, which name their sources.

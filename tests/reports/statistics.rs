@@ -142,7 +142,7 @@ const CLUSTERED: Design = Design { cluster: Some(Cluster::Seed), ..RECORDED };
 /// The statistics of traces without declarations.
 fn statistics(rows: &[Row]) -> Statistics {
     let table = table(rows);
-    Statistics::of(&table, &cells(&table), &Options::default()).unwrap()
+    Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap()
 }
 
 /// The episode table with an additional label.
@@ -165,7 +165,7 @@ fn by_place(row: &Row) -> Option<String> {
 /// The statistics of episodes with these scenes.
 fn with_scenes(rows: &[Row], design: Design, scene: impl Fn(&Row) -> Option<String>) -> Statistics {
     let table = labelled(rows, "scene", scene);
-    Statistics::of(&table, &cells(&table), &Options { design, ..Options::default() }).unwrap()
+    Statistics::from_table(&table, &cells(&table), &Options { design, ..Options::default() }).unwrap()
 }
 
 /// Recorded episodes whose scenes follow seed and run.
@@ -263,7 +263,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
     let cell = CellKey { experiment: "E1".into(), model: "a".into(), condition: "default".into() };
     (0..3).for_each(|_| lost.add(cell.clone()));
     let options = Options { lost: Some(lost), ..Options::default() };
-    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     let row = &found.losses.rows[0];
     assert_eq!((row.metric.as_str(), row.lossy.n, row.lossy.successes, row.lossy.lost), ("TSA", 18, 10, 3));
     assert_eq!(row.lossy.bounds, Interval { low: 10.0 / 21.0, high: 13.0 / 21.0 });
@@ -310,7 +310,7 @@ fn values_too_large_to_square_are_refused() {
         metrics: Vec::new(),
         ranges: Vec::new(),
     };
-    let refused = Statistics::of(&table, &none, &Options::default()).unwrap_err();
+    let refused = Statistics::from_table(&table, &none, &Options::default()).unwrap_err();
     assert!(refused.to_string().contains("smaller unit"));
 }
 
@@ -340,7 +340,7 @@ fn a_rate_that_falls_with_the_dose_has_a_trend_and_one_dose_has_none() {
     let values = [("E5", 16.0), ("E1", 0.0), ("E2", 2.0)].map(|(name, dose)| (name.to_owned(), dose));
     let factor = Factor { title: "Delay".to_owned(), unit: "steps".to_owned(), values: values.into() };
     table.catalog.factor.insert("delay".to_owned(), factor);
-    let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap();
     let [trend] = found.trends.iter().filter(|row| row.metric == "TSA").collect::<Vec<_>>()[..] else {
         panic!("{:?}", found.trends)
     };
@@ -362,7 +362,7 @@ fn a_trend_of_few_episodes_has_no_verdict() {
     let values = [("E1", 0.0), ("E2", 2.0)].map(|(name, dose)| (name.to_owned(), dose));
     let factor = Factor { title: "Delay".to_owned(), unit: "steps".to_owned(), values: values.into() };
     table.catalog.factor.insert("delay".to_owned(), factor);
-    let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap();
     let trend = found.trends.iter().find(|row| row.metric == "TSA").unwrap();
     assert_eq!((trend.p_adjusted, trend.verdict), (None, Verdict::NotSeparated));
     let text = found.render(&found.headline, Length::Full, None);

@@ -83,7 +83,11 @@ pub(crate) struct Block<'a> {
 }
 
 impl<'a> Study<'a> {
-    pub fn of(table: &'a EpisodeTable, design: Design, lost: Option<&LostCounts>) -> Result<Self, MomentOverflow> {
+    pub fn from_table(
+        table: &'a EpisodeTable,
+        design: Design,
+        lost: Option<&LostCounts>,
+    ) -> Result<Self, MomentOverflow> {
         let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
         let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
         // A table is ordered by experiment, then by model.

@@ -38,7 +38,7 @@ impl Outcomes {
     ///
     /// An episode is correct if the rate is 1. Otherwise it is wrong if its decision committed to a colour: if
     /// `answered`, which has one value per episode of the table, is true.
-    pub fn of(episodes: &EpisodeTable, answered: &[bool]) -> Option<Self> {
+    pub fn from_table(episodes: &EpisodeTable, answered: &[bool]) -> Option<Self> {
         let (experiment, success) = open_question(episodes)?;
         let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
         let all = episodes.keys.iter().zip(success.iter()).zip(answered);
@@ -54,7 +54,7 @@ impl Outcomes {
         (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows: rows.into_values().collect() })
     }
 
-    /// Returns true if there is any episode that [`of`](Self::of) would count.
+    /// Returns true if there is any episode that [`from_table`](Self::from_table) would count.
     pub fn are_there(episodes: &EpisodeTable) -> bool {
         open_question(episodes).is_some()
     }

@@ -39,7 +39,7 @@ pub(super) struct Counted {
 
 impl Counted {
     pub(super) fn replies(&self) -> Option<Replies> {
-        Replies::of(self.all.as_ref().unwrap_or(&self.results.episodes))
+        Replies::from_table(self.all.as_ref().unwrap_or(&self.results.episodes))
     }
 }
 
@@ -83,7 +83,7 @@ fn count(quality: &mut QualityByCell, lost: &LostCounts, is_known: bool) {
 
 fn counts(table: &EpisodeTable) -> LostCounts {
     let mut counts = LostCounts::default();
-    for row in (0..table.len()).filter(|row| is_lost(table, *row)) {
+    for row in (0..table.len()).filter(|row| table.is_lost(*row)) {
         let key = table.keys.get(row);
         counts.add(cell(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row))));
     }
@@ -126,10 +126,6 @@ pub(super) fn told(lost: u64) -> String {
     format!("{lost} {noun} {verb} lost without an answer")
 }
 
-fn is_lost(table: &EpisodeTable, row: usize) -> bool {
-    table.label(LOST).is_some_and(|label| label.get(row) == Some(YES))
-}
-
 impl Study {
     pub(super) fn counted(&self, results: Results) -> Counted {
         let lost = counts(&results.episodes);
@@ -151,7 +147,7 @@ impl Study {
 
 fn without(results: Results, lost: LostCounts) -> Counted {
     let all = results.episodes;
-    let kept: Vec<usize> = (0..all.len()).filter(|row| !is_lost(&all, *row)).collect();
+    let kept: Vec<usize> = (0..all.len()).filter(|row| !all.is_lost(*row)).collect();
     let mut episodes = all.taken(&kept);
     episodes.labels.retain(|label| label.name != LOST);
     let timelines = results.timelines;

@@ -65,7 +65,7 @@ impl Report {
     /// The report on the bundled traces, with the figures that need only cells and episodes.
     pub fn paper() -> Self {
         let mut report = Self::bare();
-        report.statistics = Some(Statistics::of(&report.episodes, &report.cells, &Options::default()).unwrap());
+        report.statistics = Some(Statistics::from_table(&report.episodes, &report.cells, &Options::default()).unwrap());
         let input = mirrorstats_figures::Input {
             episodes: Some(&report.episodes),
             ..mirrorstats_figures::Input::of_cells(&report.cells)

@@ -146,7 +146,7 @@ impl Changes {
     ///
     /// # Errors
     /// Columns to group by that a table lacks; sums beyond 128 bits.
-    pub fn of(before: &EpisodeTable, after: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
+    pub fn between(before: &EpisodeTable, after: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
         let metrics = Overlap::of(&names(before), &names(after));
         let (cells_compared, cells) = cell_changes(&group(before, by)?, &group(after, by)?);
         let aligned = Aligned::of(&before.keys, &after.keys);

@@ -24,7 +24,7 @@ fn table(definitions: &str, first: i32, values: &[Option<i64>]) -> EpisodeTable 
 }
 
 fn changes(before: &EpisodeTable, after: &EpisodeTable) -> Changes {
-    Changes::of(before, after, &["model".to_owned()]).unwrap()
+    Changes::between(before, after, &["model".to_owned()]).unwrap()
 }
 
 #[test]

@@ -136,11 +136,15 @@ struct Tried {
 
 impl Gate {
     /// The verdict on every cell of either side.
-    pub fn of([base, new]: [&EpisodeTable; 2], design: Design, options: &GateOptions) -> Result<Self, MomentOverflow> {
+    pub fn between(
+        [base, new]: [&EpisodeTable; 2],
+        design: Design,
+        options: &GateOptions,
+    ) -> Result<Self, MomentOverflow> {
         let sides = GateSides::of(base, new);
         let barrier = sides.barrier().filter(|_| !options.pool);
         let counted = joined(&sides, options, LossFill::Out);
-        let study = Study::of(&counted, design, None)?;
+        let study = Study::from_table(&counted, design, None)?;
         let mut cells = judged(&study, options, barrier.as_deref());
         let lost = sides.lost();
         for cell in &mut cells {
@@ -150,7 +154,7 @@ impl Gate {
         if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
             for fill in [LossFill::Against, LossFill::For] {
                 let filled = joined(&sides, options, fill);
-                let bound = judged(&Study::of(&filled, design, None)?, options, barrier.as_deref());
+                let bound = judged(&Study::from_table(&filled, design, None)?, options, barrier.as_deref());
                 let verdicts: BTreeMap<_, _> = bound.iter().map(|cell| (cell.key(), cell.verdict)).collect();
                 for cell in &mut cells {
                     cell.bounded_by(verdicts.get(&cell.key()).copied(), fill);
@@ -167,7 +171,7 @@ impl Gate {
             }
         }
         for (side, table) in [("BASE", base), ("NEW", new)] {
-            let replies = Replies::of(table).and_then(|replies| replies.sentence());
+            let replies = Replies::from_table(table).and_then(|replies| replies.sentence());
             caveats.extend(replies.map(|sentence| format!("{side}: {sentence}")));
         }
         Ok(Self { metric, margin, confidence, verdict, caveats, cells })

@@ -13,7 +13,7 @@ use crate::study::{Block, Study};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::tables::builder::TableBuilder;
-use mirrorstats_score::tables::table::{EpisodeTable, Header, KeyRef, LOST, MetricColumn};
+use mirrorstats_score::tables::table::{EpisodeTable, Header, KeyRef, MetricColumn};
 
 /// The prefixes of the condition and the episode id of each side.
 const MARKS: [&str; 2] = ["0/", "1/"];
@@ -71,7 +71,7 @@ impl<'a> GateSides<'a> {
                 let cell = (experiment, self.model(side, model), condition.unwrap_or(DEFAULT));
                 counts.entry(cell).or_default()[side] += 1;
             };
-            for row in (0..table.len()).filter(|row| is_lost(table, *row)) {
+            for row in (0..table.len()).filter(|row| table.is_lost(*row)) {
                 let key = table.keys.get(row);
                 add(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row)));
             }
@@ -90,10 +90,6 @@ impl<'a> GateSides<'a> {
     }
 }
 
-fn is_lost(table: &EpisodeTable, row: usize) -> bool {
-    table.label(LOST).is_some_and(|label| label.get(row) == Some("true"))
-}
-
 pub(super) fn joined(sides: &GateSides, options: &GateOptions, fill: LossFill) -> EpisodeTable {
     let [base, new] = sides.tables;
     let names = new.metrics.iter().map(|column| column.name.clone());
@@ -110,7 +106,7 @@ pub(super) fn joined(sides: &GateSides, options: &GateOptions, fill: LossFill) -
             if is_lost && *name == options.metric { Some(lost) } else { own }
         };
         let mark = |text: &str| format!("{}{text}", MARKS[side]);
-        for row in (0..table.len()).filter(|row| fill != LossFill::Out || !is_lost(table, *row)) {
+        for row in (0..table.len()).filter(|row| fill != LossFill::Out || !table.is_lost(*row)) {
             let key = table.keys.get(row);
             let text = |name: &str| table.label(name).and_then(|label| label.get(row)).map(str::to_owned);
             let label = |name: &&str| match *name {
@@ -119,7 +115,7 @@ pub(super) fn joined(sides: &GateSides, options: &GateOptions, fill: LossFill) -
             };
             let labels: Vec<Option<String>> = LABELS.iter().map(label).collect();
             let own = |name: &String| table.metric(name).and_then(|column| column.get(row));
-            let values = metrics.iter().map(|name| value(name, own(name), is_lost(table, row)));
+            let values = metrics.iter().map(|name| value(name, own(name), table.is_lost(row)));
             let id = mark(key.episode_id);
             let key = KeyRef { model: sides.model(side, key.model), episode_id: &id, ..key };
             builder.push(key, labels.iter().map(Option::as_deref), values);

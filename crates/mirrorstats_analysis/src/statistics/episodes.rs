@@ -38,7 +38,7 @@ pub struct UnusableReplies {
 
 impl Replies {
     /// `None` if no reply has a status.
-    pub fn of(table: &EpisodeTable) -> Option<Self> {
+    pub fn from_table(table: &EpisodeTable) -> Option<Self> {
         let label = table.label(UNUSABLE_REPLIES)?;
         let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
         let mut cells: BTreeMap<(&str, &str, Option<&str>), UnusableCount> = BTreeMap::new();

@@ -148,8 +148,8 @@ pub struct Statistics {
 impl Statistics {
     /// The statistics of `table`; `cells` are the cells of the same table, in the requested grouping. For a confidence
     /// outside (0, 1), intervals and verdicts are undefined.
-    pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
-        let mut study = Study::of(table, options.design, options.lost.as_ref())?;
+    pub fn from_table(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
+        let mut study = Study::from_table(table, options.design, options.lost.as_ref())?;
         study.pool = options.pooled.is_some();
         let confidence = options.confidence;
         let headline = conclusions::headline(&study);

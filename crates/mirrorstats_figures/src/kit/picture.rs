@@ -144,7 +144,7 @@ impl FigureFormat {
     }
 
     /// The format for the extension of `path`, in any case; SVG without an extension.
-    pub fn of(path: &Path) -> Result<Self, UnknownEnding> {
+    pub fn from_path(path: &Path) -> Result<Self, UnknownEnding> {
         let Some(ending) = path.extension().and_then(OsStr::to_str) else { return Ok(Self::Svg) };
         let named = Self::ALL.iter().copied().find(|format| format.ending().eq_ignore_ascii_case(ending));
         named.ok_or_else(|| UnknownEnding { ending: ending.to_owned() })
@@ -176,10 +176,10 @@ mod tests {
         for (name, format) in
             [("a.svg", Format::Svg), ("b/c.PNG", Format::Png), ("d.pdf", Format::Pdf), ("e", Format::Svg)]
         {
-            assert_eq!(Format::of(Path::new(name)).unwrap(), format);
+            assert_eq!(Format::from_path(Path::new(name)).unwrap(), format);
         }
         assert_eq!(
-            Format::of(Path::new("f.jpg")).unwrap_err().to_string(),
+            Format::from_path(Path::new("f.jpg")).unwrap_err().to_string(),
             "expected a file that ends in .svg, .png, .pdf, found the ending `jpg`"
         );
     }

@@ -116,7 +116,7 @@ impl Sensitivity {
     ///
     /// # Panics
     /// If there are no levels.
-    pub fn of(
+    pub fn from_levels(
         levels: &[Level],
         reference: &Reference,
         metrics: &[String],

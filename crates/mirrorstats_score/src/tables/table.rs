@@ -153,6 +153,11 @@ impl EpisodeTable {
         }
     }
 
+    /// Returns true if the episode was lost: the label [`LOST`] says so.
+    pub fn is_lost(&self, row: usize) -> bool {
+        self.label(LOST).is_some_and(|label| label.get(row) == Some("true"))
+    }
+
     /// Returns true if any episode was recorded under a condition other than the default.
     pub fn has_conditions(&self) -> bool {
         let default = schema::column(CONDITION).and_then(Column::default_text);

@@ -259,7 +259,7 @@ impl Pair {
     }
 
     pub(crate) fn changes(&self, by: &[String], style: &Style) -> Result<Changes, StudyError> {
-        let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
+        let mut changes = Changes::between(&self.before.table, &self.after.table, by)?;
         changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
         TableOrder { catalog: &self.after.table.catalog, style }.sort(&mut changes);
         Ok(changes)

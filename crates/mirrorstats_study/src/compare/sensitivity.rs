@@ -79,7 +79,7 @@ impl Study {
         let stages = self.stages(&trial, scored?)?;
         let lost = stages.first().map_or(0, |(_, lost)| *lost);
         let levels: Vec<Level> = stages.into_iter().map(|(level, _)| level).collect();
-        let found = Sensitivity::of(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
+        let found = Sensitivity::from_levels(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
         Ok(SensitivityReport { found, notes: trial.notes(lost) })
     }
 

@@ -90,7 +90,7 @@ impl Results {
             let shown = self.with_conditions_as_models();
             let answered =
                 shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
-            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&shown.episodes, &answered));
+            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::from_table(&shown.episodes, &answered));
             self.outcomes = outcomes;
         }
         if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {

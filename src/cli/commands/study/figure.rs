@@ -72,7 +72,7 @@ impl FigureArgs {
             (Some(format), _) => Ok(format),
             (None, Some(path)) => {
                 let hint = |error| Failure::input(format!("{error}; say which one with --format"));
-                FigureFormat::of(path).map_err(hint)
+                FigureFormat::from_path(path).map_err(hint)
             }
             (None, None) => Ok(FigureFormat::Svg),
         }

@@ -45,7 +45,7 @@ impl FilmstripArgs {
             return Err(Failure::input("--out: expected a file that ends in .png, .svg or .pdf"));
         }
         let missing = format!("this build writes no .{ending}; build it with the feature `raster`");
-        FigureFormat::of(&self.out).map_err(|_| Failure::input(missing))
+        FigureFormat::from_path(&self.out).map_err(|_| Failure::input(missing))
     }
 
     fn figure(&self) -> Result<Figure, Failure> {

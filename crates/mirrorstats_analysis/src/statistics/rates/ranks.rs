@@ -88,7 +88,7 @@ impl Ranks {
         design: Design,
         pool: bool,
     ) -> Result<Self, MomentOverflow> {
-        let mut study = Study::of(table, design, Some(lost))?;
+        let mut study = Study::from_table(table, design, Some(lost))?;
         study.pool = pool;
         let overall = overall::rates(&study, &headline(&study), CONFIDENCE);
         Ok(Self(RankRow::all(&compared(&study, CONFIDENCE).0, &overall)))

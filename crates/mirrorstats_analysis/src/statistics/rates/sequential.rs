@@ -127,8 +127,8 @@ pub struct SequentialPair {
 impl Sequential {
     /// The statistics of `table`, the episodes so far. For a confidence outside (0, 1), sequences and verdicts are
     /// undefined.
-    pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
-        let mut study = Study::of(table, options.design, None)?;
+    pub fn from_table(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
+        let mut study = Study::from_table(table, options.design, None)?;
         study.pool = options.pooled.is_some();
         let rates = SequentialRate::all(&study, options.confidence);
         Ok(Self {

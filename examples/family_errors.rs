@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mirrorstats_report::statistics::{Comparison, Statistics, Verdict};
+use mirrorstats_analysis::statistics::{Comparison, Statistics, Verdict};
 use mirrorstats_statistics::comparisons::holm::holm;
 use mirrorstats_statistics::comparisons::unpaired::fisher;
 use mirrorstats_statistics::durations::competing::{Ending, Outcome};

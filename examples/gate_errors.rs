@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use mirrorstats_report::gate::{Gate, GateVerdict};
+use mirrorstats_analysis::gate::{Gate, GateVerdict};
 use mirrorstats_statistics::intervals::random::SplitMix64;
 
 const SEED: u64 = 20_261_124;

@@ -90,7 +90,7 @@ run plan-runs plan --runs 7
 run plan-json plan --episodes 21 --models 2 --chance 1/3 --json
 run plan-register plan --difference 0.3 --register plan.json
 run sensitivity definitions sensitivity $recorded --out thresholds
-run sensitivity-json definitions sensitivity $recorded --json --figure thresholds.svg
+run sensitivity-json definitions sensitivity $recorded --json
 for command in info validate; do
   for inputs in $paper $recorded fixtures/damaged fixtures/checksums fixtures/glimpses.parquet; do
     run "$command-${inputs//\//-}" trace $command $inputs

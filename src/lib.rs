@@ -86,15 +86,14 @@
 
 pub mod cli;
 
+pub use mirrorstats_analysis::changes::{CellChange, Changes, Flip};
+pub use mirrorstats_analysis::statistics::{Options as StatisticsOptions, Statistics};
 pub use mirrorstats_exact::moments::Moments;
+pub use mirrorstats_figures::{Figure, FigureFormat, FigureName, FigureWidth};
 pub use mirrorstats_report::bundle::Manifest;
-pub use mirrorstats_report::cells::columns::record_batch;
-pub use mirrorstats_report::cells::diff::{CellChange, Changes, Flip};
-pub use mirrorstats_report::cells::{Cells, Group, KeyValue};
-pub use mirrorstats_report::figures::{Figure, FigureFormat, FigureName, FigureWidth};
 pub use mirrorstats_report::layout::MetricTable;
-pub use mirrorstats_report::statistics::{Options as StatisticsOptions, Statistics};
-pub use mirrorstats_report::tables::Table;
+pub use mirrorstats_score::cells::columns::record_batch;
+pub use mirrorstats_score::cells::{Cells, Group, KeyValue};
 pub use mirrorstats_score::evidence::Evidence;
 pub use mirrorstats_score::tables::columns::record_batch as episode_batch;
 pub use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
@@ -102,3 +101,4 @@ pub use mirrorstats_study::{
     Backend, Diff, DiffRequest, FigureOptions, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side,
     Study, StudyError, diff, resolve,
 };
+pub use mirrorstats_tables::Table;

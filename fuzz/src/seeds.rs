@@ -5,16 +5,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mirrorstats_analysis::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_analysis::plan::{Given, PlanRequest, plan};
 use mirrorstats_log::message::Decision;
 use mirrorstats_log::write::EpisodeLog;
 use mirrorstats_log::{assemble, topic};
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::file::{built_in, built_in_names};
-use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
-use mirrorstats_report::plan::{Given, PlanRequest, plan};
 use mirrorstats_score::format::{self, Format};
-use mirrorstats_score::score_traces;
-use mirrorstats_score::vocabulary;
+use mirrorstats_score::{score_traces, vocabulary};
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_statistics::sample_size::Clusters;
 use mirrorstats_vlm::journal::Entry;

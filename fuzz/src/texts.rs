@@ -4,12 +4,12 @@ use std::fs;
 use std::io;
 use std::sync::LazyLock;
 
+use mirrorstats_analysis::plan::register::RegisteredPlan;
 use mirrorstats_experiment::file;
 use mirrorstats_experiment::spec::Spec;
 use mirrorstats_metric::catalogs::catalog::Catalog;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_report::bundle::{Manifest, check_old};
-use mirrorstats_report::plan::register::RegisteredPlan;
 use mirrorstats_report::style::Style;
 use mirrorstats_score::format::{self, Format, Partition};
 use mirrorstats_score::vocabulary;

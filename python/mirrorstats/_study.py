@@ -258,7 +258,6 @@ class Study:
         *,
         style: Style = "default",
         metric: Optional[Names] = None,
-        title: Optional[str] = None,
         width: Optional[str] = None,
     ) -> Figure:
         """A figure by name, as `mirrorstats figure`.
@@ -267,7 +266,6 @@ class Study:
             name: the figure.
             style: for the order of the models, and for the metrics and captions of figures.
             metric: the metrics that it shows, one or several in the order of their roles; those of the style if None.
-            title: a heading of its own.
             width: the width on paper from 8 cm to 50 cm, such as `8.5cm`, `85mm`, `3.3in`, `240pt` or `640px`; text has at least
                 6 pt there. As wide as it is drawn if None.
 
@@ -277,10 +275,10 @@ class Study:
 
         Example:
             >>> import mirrorstats as ms
-            >>> ms.open(ms.example_runs()).figure("intervals", metric="CAAL", title="Self-attribution", width="8.5cm")
+            >>> ms.open(ms.example_runs()).figure("intervals", metric="CAAL", width="8.5cm")
             <mirrorstats.Figure: intervals>
         """
-        return self._native.figure(name, self._style(style), _names("metric", metric), title, width)
+        return self._native.figure(name, self._style(style), _names("metric", metric), width)
 
     def query(self, sql: str) -> ArrowTable:
         """The rows of a SELECT over the tables `steps`, `episodes` and `cells`, as `mirrorstats query`.
@@ -313,16 +311,15 @@ class Study:
         """
         return Manifest(self._native.report(text(out, self._spool), self._style(style), figures))
 
-    def stats(self, *, confidence: float = 0.95, horizon: Optional[int] = None, full: bool = False) -> Statistics:
+    def stats(self, *, confidence: float = 0.95, full: bool = False) -> Statistics:
         """Intervals, tests and comparisons of the cells, as `mirrorstats stats --json`; `Statistics` has them as frames too.
 
         Args:
             confidence: of every interval, between 0 and 1; tests are at one minus it.
-            horizon: of restricted means, in steps; the last step known for every model of an experiment if None.
             full: whether the text has every test, not the answers alone.
 
         Raises:
-            ArgumentError: a confidence that is not between 0 and 1, a horizon below 1.
+            ArgumentError: a confidence that is not between 0 and 1.
 
         Example:
             >>> import mirrorstats as ms
@@ -331,8 +328,7 @@ class Study:
             (168, 0.9)
         """
         check_share("confidence", confidence)
-        check_number("horizon", horizon, 1)
-        return Statistics(self._native.stats(confidence, horizon, full))
+        return Statistics(self._native.stats(confidence, full))
 
     def diff(self, other: Study) -> Changes:
         """What changes from this study to another one: cells, and values of episodes, as `mirrorstats diff --json`.

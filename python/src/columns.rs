@@ -119,8 +119,7 @@ impl Table {
         let options = FormatOptions::default();
         let columns = self.batch.columns().iter().map(|column| ArrayFormatter::try_new(column.as_ref(), &options));
         let columns = columns.collect::<Result<Vec<_>, _>>()?;
-        let mut table =
-            mirrorstats_report::tables::Table::of_texts(schema.fields().iter().map(|field| field.name().as_str()));
+        let mut table = mirrorstats_tables::Table::of_texts(schema.fields().iter().map(|field| field.name().as_str()));
         for row in (0..rows).filter(|row| *row < SHOWN / 2 || row + SHOWN / 2 >= rows) {
             let cells = columns.iter().zip(self.batch.columns());
             let cell = |(values, array): (&ArrayFormatter, &ArrayRef)| {

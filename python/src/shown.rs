@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mirrorstats::{FigureFormat, MetricTable};
-use mirrorstats_report::tables::Terminal;
+use mirrorstats_tables::Terminal;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -152,7 +152,7 @@ impl Figure {
     #[expect(clippy::needless_pass_by_value, reason = "Python's values become owned ones")]
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| {
-            let bytes = self.encode(FigureFormat::of(&path).map_err(error::of_argument)?)?;
+            let bytes = self.encode(FigureFormat::from_path(&path).map_err(error::of_argument)?)?;
             mirrorstats_exact::replace::replace(&path, &bytes).map_err(|fault| error::of_writing(&path, &fault))
         })
     }

@@ -6,10 +6,9 @@ use std::sync::{Arc, OnceLock};
 
 use arrow::array::RecordBatch;
 use mirrorstats::{FigureName, FigureOptions, ReportOptions, StatisticsOptions};
-use mirrorstats_report::changes::Limit;
-use mirrorstats_report::figures::InvalidWidth;
-use mirrorstats_report::gate::{GateFormat, GateOptions};
-use mirrorstats_report::statistics::text::Length;
+use mirrorstats_analysis::gate::{GateFormat, GateOptions};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_figures::InvalidWidth;
 use mirrorstats_study::{LostAs, Question};
 use pyo3::prelude::*;
 
@@ -114,20 +113,19 @@ impl Study {
         py.detach(|| Ok(self.tables_of(style)?.tables.iter().map(ReportTable::new).collect()))
     }
 
-    #[pyo3(signature = (name, style, metrics, title, width))]
+    #[pyo3(signature = (name, style, metrics, width))]
     fn figure(
         &self,
         py: Python<'_>,
         name: &str,
         style: String,
         metrics: Option<Vec<String>>,
-        title: Option<String>,
         width: Option<&str>,
     ) -> PyResult<Figure> {
         let name = FigureName::from_str(name).map_err(error::of_argument)?;
         let width = width.map(str::parse).transpose();
         let width = width.map_err(|fault: InvalidWidth| error::of_argument(format!("width: {fault}")))?;
-        let options = FigureOptions { style: style.into(), metrics, title, width, top: None };
+        let options = FigureOptions { style: style.into(), metrics, width, top: None };
         let figure = py.detach(|| self.inner.figure(name, &options).map_err(error::of_study))?;
         Ok(Figure::new(figure, name.name()))
     }
@@ -143,9 +141,9 @@ impl Study {
         answer::of(&written.manifest, [written.files, notes].concat().join("\n"))
     }
 
-    #[pyo3(signature = (confidence, horizon, full))]
-    fn stats(&self, py: Python<'_>, confidence: f64, horizon: Option<i64>, full: bool) -> PyResult<Answer> {
-        let options = StatisticsOptions { confidence, horizon, improvements: true, ..StatisticsOptions::default() };
+    #[pyo3(signature = (confidence, full))]
+    fn stats(&self, py: Python<'_>, confidence: f64, full: bool) -> PyResult<Answer> {
+        let options = StatisticsOptions { confidence, improvements: true, ..StatisticsOptions::default() };
         let found = py.detach(|| self.inner.statistics(&options).map_err(error::of_study))?;
         answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Short }, None))
     }
@@ -157,7 +155,7 @@ impl Study {
 
     fn diff(&self, py: Python<'_>, other: &Self) -> PyResult<Answer> {
         let found = py.detach(|| self.inner.diff(&other.inner).map_err(error::of_study))?;
-        let shown = found.changes.render(Limit(LISTED), None);
+        let shown = found.changes.render(LISTED, None);
         let notes = found.notes.iter().map(|note| format!("note: {note}"));
         answer::of(&found.changes, notes.chain([shown]).collect::<Vec<_>>().join("\n"))
     }

@@ -198,7 +198,6 @@ def test_errors_have_specific_types_and_name_arguments(paper, tmp_path):
         (lambda: ms.open(paper, metrics="TSAA"), ms.ArgumentError),
         (lambda: study.figure("interval"), ms.ArgumentError),
         (lambda: study.table("mian"), ms.ArgumentError),
-        (lambda: study.stats(horizon=-3), ms.ArgumentError),
         (lambda: study.stats(confidence=95), ms.ArgumentError),
         (lambda: study.explain("E1/none"), ms.ArgumentError),
         (lambda: study.report(paper), ms.OutputError),

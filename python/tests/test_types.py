@@ -20,7 +20,7 @@ study.figure("heatmap").save("heatmap.png")
 warnings: list[str] = study.stats(confidence=0.9)["warnings"]
 height: int = study.stats().tests.to_polars().height
 latex: str = study.table(style="paper").latex
-study.figure("intervals", metric="TSA", title="Success", width="8.5cm")
+study.figure("intervals", metric="TSA", width="8.5cm")
 verdict = ms.gate(study, study, metric="TSA", margin=0.2)
 steps: Optional[list[int]] = verdict["cells"][0]["flips"][0]["new"]["timesteps"]
 if verdict["verdict"] == "regressed":

@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal as _};
 
-use mirrorstats_report::tables::{Marks, Terminal};
+use mirrorstats_tables::{Marks, Terminal};
 
 /// The most columns of a line: COLUMNS if set, else the terminal's. `None` if output goes to a file or a pipe, where
 /// lines may be of any length.

@@ -105,7 +105,7 @@ fn outputs(at: &Path, to: &Renaming) -> BTreeMap<String, String> {
     let commands: [&[&str]; 9] = [
         &["report", "a.parquet", "--style", "look.toml", "--out", "out"],
         &["stats", "a.parquet", "--full"],
-        &["stats", "a.parquet", "--json", "--horizon", "9"],
+        &["stats", "a.parquet", "--json"],
         &["stats", "a.parquet", "--sequential"],
         &["score", "a.parquet"],
         &["score", "a.parquet", "-o", "scores.csv"],

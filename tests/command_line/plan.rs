@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use mirrorstats_report::plan::register::RegisteredPlan;
+use mirrorstats_analysis::plan::register::RegisteredPlan;
 
 use crate::{assert_shown, run, two_files};
 

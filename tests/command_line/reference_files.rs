@@ -9,13 +9,12 @@ use crate::harness::files::repository;
 use crate::reference::cell;
 
 /// The files: schema, heading, command that checks one.
-const FILES: [(&str, &str, &str); 6] = [
+const FILES: [(&str, &str, &str); 5] = [
     ("definitions", "Definitions", "mirrorstats definitions check mine.toml"),
     ("style", "Styles", "mirrorstats style check mine.toml"),
     ("experiments", "Experiments", "mirrorstats experiments check mine.toml"),
     ("world-config", "The world: `record --config FILE`", ""),
     ("models", "Models: `record --models FILE`", ""),
-    ("errata", "Errata: `table compare --errata FILE`", ""),
 ];
 
 pub fn page() -> String {

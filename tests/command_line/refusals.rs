@@ -4,7 +4,6 @@ use std::fs;
 use std::path::Path;
 
 use crate::assert_shown;
-use crate::harness::files::repository;
 use crate::{contents, fixture, run, run_with_input, two_files};
 
 /// Damage in columns that the paper's definitions do not read; only `validate` finds it.
@@ -143,7 +142,6 @@ fn bad_usage_has_a_problem_and_a_remedy() {
             (&["stats", "a.parquet", "--metric", "TSAA"], &["`TSAA`", "did you mean `TSA`?"]),
             (&["stats", "a.parquet", "--confidence", "95"], &["between 0 and 1", "95"]),
             (&["stats", "a.parquet", "--sequential", "--metric", "TTD"], &["no rate is named `TTD`", "TSA"]),
-            (&["stats", "a.parquet", "--sequential", "--horizon", "50"], &["--horizon", "--sequential"]),
             (&["table", "compare", "a.parquet"], &["--published"]),
             (&["table", "compare", "a.parquet", "--published", "no.csv"], &["no.csv", "No such file"]),
             (&["table", "compare", "a.parquet", "--published", "file"], &["file"]),
@@ -184,17 +182,4 @@ fn the_first_fault_is_the_same_for_any_number_of_threads() {
     for threads in ["1", "2", "8"] {
         assert_eq!(told(threads, &backwards.join("\n")), expected);
     }
-}
-
-#[test]
-fn faults_of_a_list_of_errata_are_reported_once_with_their_lines() {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("e.toml"), "[[erratum]]\ntable = 'main'\nfield = 'median'\n").unwrap();
-    let table = repository().join("fixtures/published/main_table.csv");
-    let paper = repository().join("fixtures/paper");
-    let (table, paper) = (table.to_str().unwrap(), paper.to_str().unwrap());
-    let refused =
-        run(folder.path(), &["table", "compare", paper, "--published", table, "--errata", "e.toml"]).refused();
-    assert!(refused.starts_with("error: an erratum needs `experiment`\n --> e.toml:1:1\n"), "{refused}");
-    assert!(refused.contains("did you mean `mean`?") && !refused.contains("error: error"), "{refused}");
 }

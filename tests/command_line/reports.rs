@@ -98,19 +98,6 @@ fn a_folder_of_figures_goes_with_the_last_of_them() {
 }
 
 #[test]
-fn a_report_whose_manifest_lists_no_outputs_is_known_by_its_names() {
-    let folder = two_files();
-    let out = folder.path().join("out");
-    put_foreign(&out);
-    run(folder.path(), &[&["report", "--out", "out"], &LARGE[..]].concat()).done();
-    let mut manifest: Value = serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
-    manifest.as_object_mut().unwrap().remove("outputs").unwrap();
-    fs::write(out.join("manifest.json"), manifest.to_string()).unwrap();
-    run(folder.path(), &[&["report", "--out", "out"], &SMALL[..]].concat()).done();
-    assert!(contents(&out) == with_foreign(fresh(folder.path(), &SMALL)), "{:#?}", contents(&out).keys());
-}
-
-#[test]
 fn a_foreign_manifest_removes_no_files() {
     let folder = two_files();
     let out = folder.path().join("out");

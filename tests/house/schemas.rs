@@ -5,20 +5,19 @@ use std::path::PathBuf;
 
 use mirrorstats::cli::printed_schema;
 use mirrorstats_agents::reply;
+use mirrorstats_analysis::changes::Changes;
+use mirrorstats_analysis::gate::Gate;
+use mirrorstats_analysis::plan::Plan;
+use mirrorstats_analysis::plan::register::RegisteredPlan;
+use mirrorstats_analysis::statistics::{Sequential, Statistics};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_log::message::{Decision, EpisodeMessage};
 use mirrorstats_metric::logical_plan::explain::Explanation;
 use mirrorstats_metric::shape::DefinitionFile;
-use mirrorstats_report::audit::Audit;
 use mirrorstats_report::bundle::Manifest;
-use mirrorstats_report::cells::diff::Changes;
-use mirrorstats_report::comparison::PublishedComparison;
-use mirrorstats_report::errata::Errata;
-use mirrorstats_report::gate::Gate;
-use mirrorstats_report::plan::Plan;
-use mirrorstats_report::plan::register::RegisteredPlan;
+use mirrorstats_report::published::audit::Audit;
+use mirrorstats_report::published::comparison::PublishedComparison;
 use mirrorstats_report::sensitivity::Sensitivity;
-use mirrorstats_report::statistics::{Sequential, Statistics};
 use mirrorstats_report::style::StyleSheet;
 use mirrorstats_score::evidence::Evidence;
 use mirrorstats_study::verify::Verification;
@@ -46,7 +45,6 @@ fn current() -> Vec<(&'static str, Value)> {
         ("definitions", json!(schema_for!(DefinitionFile))),
         ("diff", printed_schema::<Changes>()),
         ("episode", json!(schema_for!(EpisodeMessage))),
-        ("errata", json!(schema_for!(Errata))),
         ("gate", printed_schema::<Gate>()),
         ("import", printed_schema::<ImportAnswer>()),
         ("info", json!(schema_for!(Info))),

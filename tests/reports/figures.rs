@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use cast::Cast;
 use mirrorstats_exact::number;
-use mirrorstats_report::figures::{FigureError, FigureName, FigureWidth, Input, draw, sensitivity};
+use mirrorstats_figures::{FigureError, FigureName, FigureWidth, Input, draw};
 use mirrorstats_statistics::intervals::interval::wilson;
 use resvg::usvg::roxmltree::{Document, Node};
 use resvg::usvg::{self, Rect, fontdb};
@@ -69,34 +69,6 @@ fn check_texts(label: &str, svg: &str) {
     }
 }
 
-/// Checks the figure of thresholds with the same cells for each threshold.
-fn check_thresholds(label: &str, cast: &Cast, px: &[u32]) {
-    let px = [None].into_iter().chain(px.iter().copied().map(Some));
-    let stages: Vec<_> = px.map(|px| sensitivity::Stage { px, cells: &cast.cells }).collect();
-    let metrics = ["MCR", "CR", "TTD", "MTATO"].map(str::to_owned);
-    let reference = "recorded (60 and 1000 px)";
-    let input = sensitivity::SensitivityInput { stages: &stages, metrics: &metrics, order: &[], reference };
-    let svg = sensitivity::draw(&input).unwrap().inline_svg();
-    check_texts(&format!("sensitivity {label}"), &svg);
-    let known = cast.cells.groups.iter().flat_map(|group| cast.cells.metrics.iter().zip(&group.moments));
-    let known = known.filter(|(metric, moments)| metrics.contains(metric) && moments.n > 0).count();
-    assert_eq!(svg.matches("data-threshold=").count(), known * stages.len(), "{label}");
-}
-
-#[test]
-fn no_text_of_thresholds_leaves_the_frame_or_overlaps_another() {
-    for count in [1, 8, 20] {
-        let cast = cast::made_up(&cast::names(count, 17));
-        for px in [&[60][..], &[1, 10, 30, 60, 120, 240], &[1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 20_000, 100_000]]
-        {
-            check_thresholds(&format!("{count} {px:?}"), &cast, px);
-        }
-    }
-    for kept in [&["E1"][..], &["E1", "E4"], &["E1", "E2", "E3"]] {
-        check_thresholds(&format!("{kept:?}"), &cast::paper().without(|e, _| !kept.contains(&e)), &[1, 60, 240]);
-    }
-}
-
 #[test]
 fn no_text_leaves_the_frame_or_overlaps_another() {
     for count in [1, 2, 8, 20] {
@@ -131,10 +103,9 @@ fn smallest(svg: &str) -> f64 {
 fn text_is_legible_and_in_the_frame_at_every_width() {
     let casts = [("paper", cast::paper()), ("9 x 40", cast::made_up(&cast::names(9, 40)))];
     for (width, px) in [("8cm", 302.36), ("120mm", 453.54), ("9in", 864.0)] {
-        let title = "Self-identification of eight models in a world with one mirror and a second body";
         for (label, cast) in &casts {
             for name in FigureName::ALL {
-                let input = Input { width: Some(width.parse().unwrap()), title: Some(title), ..cast.input() };
+                let input = Input { width: Some(width.parse().unwrap()), ..cast.input() };
                 let label = format!("{name} {label} {width}");
                 let svg = draw(name, &input).unwrap_or_else(|error| panic!("{label}: {error}")).inline_svg();
                 check_texts(&label, &svg);
@@ -185,7 +156,7 @@ fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
 /// The cells: (experiment, model, metric) to n and the full mean, which is empty if undefined.
 fn expected(cast: &Cast) -> BTreeMap<(String, String, String), (String, String)> {
     let cells = &cast.cells;
-    let of_group = |group: &mirrorstats_report::cells::Group| {
+    let of_group = |group: &mirrorstats_score::cells::Group| {
         let key = [0, 1].map(|at| group.key[at].to_string());
         let values = cells.metrics.iter().zip(group.moments.clone());
         let values = values.map(move |(metric, moments)| {
@@ -432,7 +403,7 @@ fn the_order_of_groups_does_not_matter() {
 #[test]
 fn figures_that_cannot_be_drawn_have_a_reason() {
     let check = |found: Result<_, FigureError>, expected: &str| {
-        assert_eq!(found.map(|_: mirrorstats_report::figures::Figure| ()).unwrap_err().to_string(), expected);
+        assert_eq!(found.map(|_: mirrorstats_figures::Figure| ()).unwrap_err().to_string(), expected);
     };
     let cast = cast::paper();
     let bare = Input::of_cells(&cast.cells);

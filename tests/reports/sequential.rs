@@ -3,8 +3,8 @@
 #![expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 
 use indexmap::IndexMap;
+use mirrorstats_analysis::statistics::{Options, Sequential, Verdict};
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use mirrorstats_report::statistics::{Options, Sequential, Verdict};
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 
 use crate::assert_shown;
@@ -92,7 +92,7 @@ fn with_scenes(blocks: &[Block], repeats: i32, scene: impl Fn(&str, i32) -> Opti
             MetricColumn::new("MCR", rows().map(|(_, at)| (at > 0).then_some(1))),
         ],
     };
-    Sequential::of(&table, &Options::default()).unwrap()
+    Sequential::from_table(&table, &Options::default()).unwrap()
 }
 
 // The e-values and bounds are those in the tests of `stats::sequential`, which name their sources.

@@ -6,12 +6,12 @@ mod losses;
 mod units;
 
 use indexmap::IndexMap;
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
-use mirrorstats_report::cells::interval::ranges;
-use mirrorstats_report::cells::{Cells, Group, KeyValue};
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
+use mirrorstats_score::cells::interval::ranges;
+use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_score::quality::CellKey;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
@@ -142,7 +142,7 @@ const CLUSTERED: Design = Design { cluster: Some(Cluster::Seed), ..RECORDED };
 /// The statistics of traces without declarations.
 fn statistics(rows: &[Row]) -> Statistics {
     let table = table(rows);
-    Statistics::of(&table, &cells(&table), &Options::default()).unwrap()
+    Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap()
 }
 
 /// The episode table with an additional label.
@@ -165,7 +165,7 @@ fn by_place(row: &Row) -> Option<String> {
 /// The statistics of episodes with these scenes.
 fn with_scenes(rows: &[Row], design: Design, scene: impl Fn(&Row) -> Option<String>) -> Statistics {
     let table = labelled(rows, "scene", scene);
-    Statistics::of(&table, &cells(&table), &Options { design, ..Options::default() }).unwrap()
+    Statistics::from_table(&table, &cells(&table), &Options { design, ..Options::default() }).unwrap()
 }
 
 /// Recorded episodes whose scenes follow seed and run.
@@ -204,7 +204,7 @@ fn cells_carry_counts_and_the_intervals_of_their_kind() {
     let found = statistics(&study());
     let cell = |experiment: &str, model: &str, metric: &str| {
         let key = [("experiment", experiment), ("model", model)];
-        let is_it = |cell: &&mirrorstats_report::statistics::CellRow| {
+        let is_it = |cell: &&mirrorstats_analysis::statistics::CellRow| {
             cell.metric == metric && key.iter().all(|(name, value)| cell.key[*name] == KeyValue::Text((*value).into()))
         };
         found.cells.iter().find(is_it).unwrap()
@@ -263,7 +263,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
     let cell = CellKey { experiment: "E1".into(), model: "a".into(), condition: "default".into() };
     (0..3).for_each(|_| lost.add(cell.clone()));
     let options = Options { lost: Some(lost), ..Options::default() };
-    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     let row = &found.losses.rows[0];
     assert_eq!((row.metric.as_str(), row.lossy.n, row.lossy.successes, row.lossy.lost), ("TSA", 18, 10, 3));
     assert_eq!(row.lossy.bounds, Interval { low: 10.0 / 21.0, high: 13.0 / 21.0 });
@@ -310,7 +310,7 @@ fn values_too_large_to_square_are_refused() {
         metrics: Vec::new(),
         ranges: Vec::new(),
     };
-    let refused = Statistics::of(&table, &none, &Options::default()).unwrap_err();
+    let refused = Statistics::from_table(&table, &none, &Options::default()).unwrap_err();
     assert!(refused.to_string().contains("smaller unit"));
 }
 
@@ -340,7 +340,7 @@ fn a_rate_that_falls_with_the_dose_has_a_trend_and_one_dose_has_none() {
     let values = [("E5", 16.0), ("E1", 0.0), ("E2", 2.0)].map(|(name, dose)| (name.to_owned(), dose));
     let factor = Factor { title: "Delay".to_owned(), unit: "steps".to_owned(), values: values.into() };
     table.catalog.factor.insert("delay".to_owned(), factor);
-    let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap();
     let [trend] = found.trends.iter().filter(|row| row.metric == "TSA").collect::<Vec<_>>()[..] else {
         panic!("{:?}", found.trends)
     };
@@ -362,7 +362,7 @@ fn a_trend_of_few_episodes_has_no_verdict() {
     let values = [("E1", 0.0), ("E2", 2.0)].map(|(name, dose)| (name.to_owned(), dose));
     let factor = Factor { title: "Delay".to_owned(), unit: "steps".to_owned(), values: values.into() };
     table.catalog.factor.insert("delay".to_owned(), factor);
-    let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap();
     let trend = found.trends.iter().find(|row| row.metric == "TSA").unwrap();
     assert_eq!((trend.p_adjusted, trend.verdict), (None, Verdict::NotSeparated));
     let text = found.render(&found.headline, Length::Full, None);

@@ -1,7 +1,7 @@
 //! The paper's ten metrics at the edges of their definitions; `by_hand.txt` holds steps and expected values.
 
 use mirrorstats_exact::moments::StandardError;
-use mirrorstats_report::cells::group::group;
+use mirrorstats_score::cells::group::group;
 use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 
 use crate::harness;

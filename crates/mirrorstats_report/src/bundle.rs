@@ -11,15 +11,15 @@ use std::path::{Component, Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::cells::{Cell, Cells};
-use crate::figures::FigureName;
 use crate::layout::MetricTable;
+use crate::layout::key_field;
 use crate::style::Style;
-use crate::tables::{ListTable, Table, key_field};
 use mirrorstats_exact::hash;
 use mirrorstats_exact::number::full_precision;
 use mirrorstats_exact::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
 use mirrorstats_metric::catalogs::catalog::Catalog;
+use mirrorstats_score::cells::{Cell, Cells};
+use mirrorstats_tables::{ListTable, Table};
 
 /// The name of the manifest, which is written last.
 pub const MANIFEST: &str = "manifest.json";
@@ -67,8 +67,8 @@ pub struct Manifest {
     pub filter: Option<String>,
     /// The inputs, ordered by path, then hash.
     pub inputs: Vec<InputFile>,
-    /// What was written beside this manifest, ordered by path. Absent in reports of earlier versions, and in the copy
-    /// inside `report.html`, whose own hash would have to be in it.
+    /// What was written beside this manifest, ordered by path. Absent in the copy inside `report.html`, whose own hash
+    /// would have to be in it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<Output>,
     /// The definitions that gave the values.
@@ -259,7 +259,7 @@ fn check_paths(files: &[OutputFile]) -> Result<(), BundleError> {
 /// The needed part of a manifest; other versions may have more fields.
 #[derive(Deserialize)]
 struct Listed {
-    outputs: Option<Vec<ListedOutput>>,
+    outputs: Vec<ListedOutput>,
     /// Only distinguishes a report's manifest from other files of that name.
     #[serde(rename = "schema_version")]
     _schema_version: u32,
@@ -275,31 +275,5 @@ struct ListedOutput {
 fn old_files(folder: &Path) -> Vec<PathBuf> {
     let manifest = fs::read(folder.join(MANIFEST)).ok();
     let Some(Ok(manifest)) = manifest.map(|text| serde_json::from_slice::<Listed>(&text)) else { return Vec::new() };
-    let mut files = match manifest.outputs {
-        Some(outputs) => outputs.into_iter().map(|output| output.path).collect(),
-        None => by_name(folder),
-    };
-    files.push(MANIFEST.into());
-    files
-}
-
-/// The files that an older report may have, by name: the files with fixed names, every figure in every format, and
-/// every table that exists in all three formats.
-fn by_name(folder: &Path) -> Vec<PathBuf> {
-    let mut files: Vec<PathBuf> = ["cells.csv", "episodes.parquet", "report.html"].map(PathBuf::from).into();
-    for figure in FigureName::ALL {
-        files.extend(["svg", "png", "pdf"].map(|ending| format!("figures/{figure}.{ending}").into()));
-    }
-    for name in table_names(folder) {
-        files.extend(["tex", "md", "csv"].map(|ending| format!("tables/{name}.{ending}").into()));
-    }
-    files.retain(|file| folder.join(file).is_file());
-    files
-}
-
-fn table_names(folder: &Path) -> Vec<String> {
-    let tables = folder.join("tables");
-    let entries = fs::read_dir(&tables).into_iter().flatten().flatten();
-    let names = entries.filter_map(|entry| entry.file_name().to_str()?.strip_suffix(".tex").map(str::to_owned));
-    names.filter(|name| ["md", "csv"].iter().all(|ending| tables.join(format!("{name}.{ending}")).is_file())).collect()
+    manifest.outputs.into_iter().map(|output| output.path).chain([MANIFEST.into()]).collect()
 }

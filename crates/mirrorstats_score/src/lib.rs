@@ -23,6 +23,7 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod cells;
 pub mod error;
 pub mod evidence;
 pub mod flips;

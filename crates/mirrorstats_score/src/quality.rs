@@ -15,7 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::tables::builder::{default_text, episode_ids};
-use super::tables::table::CONDITION;
+use super::tables::table::{CONDITION, UnusableCount};
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::EpisodeBatch;
 use mirrorstats_trace::schema::{self, Kind};
@@ -58,7 +58,7 @@ pub struct Quality {
     pub faults: BTreeMap<String, u64>,
     /// Unusable and all replies of each episode with a reply.
     #[serde(skip)]
-    pub by_episode: BTreeMap<String, [u64; 2]>,
+    pub by_episode: BTreeMap<String, UnusableCount>,
     /// Milliseconds from request to reply: how many replies took so long.
     #[serde(skip)]
     pub latencies: BTreeMap<i64, u64>,
@@ -175,7 +175,7 @@ impl QualityByCell {
     }
 
     /// Takes the unusable and total replies of each episode out of this tally.
-    pub fn take_by_episode(&mut self) -> BTreeMap<String, [u64; 2]> {
+    pub fn take_by_episode(&mut self) -> BTreeMap<String, UnusableCount> {
         self.0.values_mut().flat_map(|quality| std::mem::take(&mut quality.by_episode)).collect()
     }
 
@@ -244,7 +244,7 @@ impl QualityReader {
             counts.rest.steps += (rows[1] - rows[0]) as u64;
             if !self.columns.is_empty() {
                 (rows[0]..rows[1]).for_each(|row| columns.add(row, counts));
-                let replies = columns.replies(rows[0]..rows[1]).filter(|[_, all]| *all > 0);
+                let replies = columns.replies(rows[0]..rows[1]).filter(|count| count.replies > 0);
                 counts.rest.by_episode.extend(ids.get(episode).cloned().zip(replies));
             }
         }
@@ -319,12 +319,14 @@ impl<'a> ReplyColumns<'a> {
         Self { texts: TEXTS.map(|name| Coded::of(batch, name)), numbers }
     }
 
-    fn replies(&self, rows: Range<usize>) -> Option<[u64; 2]> {
+    fn replies(&self, rows: Range<usize>) -> Option<UnusableCount> {
         let status = self.texts[0].as_ref()?;
-        let codes = rows.filter_map(|row| status.code(row));
-        Some(codes.fold([0; 2], |[unusable, all], code| {
-            [unusable + u64::from(!ReplyCounts::is_read(status.texts.value(code))), all + 1]
-        }))
+        let mut count = UnusableCount::default();
+        for code in rows.filter_map(|row| status.code(row)) {
+            let unusable = u64::from(!ReplyCounts::is_read(status.texts.value(code)));
+            count.add(UnusableCount { unusable, replies: 1 });
+        }
+        Some(count)
     }
 
     fn add(&self, row: usize, Counts { texts, rest }: &mut Counts) {

@@ -43,27 +43,27 @@ use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use mirrorstats_analysis::plan::departures::{Looks, departures};
+use mirrorstats_analysis::plan::register::RegisteredPlan;
+use mirrorstats_analysis::statistics::{Options, Ranks, Replies};
 use mirrorstats_exact::replace;
+use mirrorstats_figures::{Figure, FigureName};
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::file;
 use mirrorstats_report::bundle::BundleError;
-use mirrorstats_report::cells::Cells;
-use mirrorstats_report::cells::group::group;
-use mirrorstats_report::comparison::{PublishedComparison, choose, compare};
-use mirrorstats_report::errata::Errata;
-use mirrorstats_report::figures::{Figure, FigureName};
 pub use mirrorstats_report::layout;
 use mirrorstats_report::layout::MetricTable;
-use mirrorstats_report::plan::departures::{Looks, departures};
-use mirrorstats_report::plan::register::RegisteredPlan;
 use mirrorstats_report::published;
-use mirrorstats_report::statistics::{Options, Ranks, Replies};
+use mirrorstats_report::published::comparison::{PublishedComparison, choose, compare};
+use mirrorstats_report::published::errata;
 use mirrorstats_report::style::{EmphasisRule, Style};
-use mirrorstats_report::tables::ListTable;
+use mirrorstats_score::cells::Cells;
+use mirrorstats_score::cells::group::group;
 use mirrorstats_score::evidence::{self, Evidence};
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::{score_traces, vocabulary};
+use mirrorstats_tables::ListTable;
 use mirrorstats_trace::footers::checksums::stale_note;
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
@@ -294,7 +294,7 @@ impl Study {
         }
         if let Some(top) = options.top {
             let metric = options.metrics.iter().flatten().next().cloned();
-            results = results.of_the_best(top, &metric.map_or_else(|| self.leading_metric(), Ok)?);
+            results = results.top_models(top, &metric.map_or_else(|| self.leading_metric(), Ok)?);
         }
         Ok(FigureInputs::of(&results, &style)?.with(options.clone()).draw(name)?)
     }
@@ -337,24 +337,18 @@ impl Study {
         Ok((one, definitions))
     }
 
-    /// Compares a table of the study with a published one, cell by cell. `table` names it; the default is the first
-    /// table that has all the published metrics. Errors: faults of the published table, the style or the inputs; an
-    /// unknown table.
-    pub fn compare(
-        &self,
-        published: &Path,
-        style: impl AsRef<Path>,
-        table: Option<&str>,
-        errata: &Errata,
-    ) -> Result<PublishedComparison, StudyError> {
+    /// Compares the first table that has all the published metrics with the published one, cell by cell. The paper's
+    /// style knows the slips of the paper's tables. Errors: faults of the published table, the style or the inputs.
+    pub fn compare(&self, published: &Path, style: impl AsRef<Path>) -> Result<PublishedComparison, StudyError> {
         // Small files first: a mistake in them should not cost a scan of the traces.
         let published = published::read(published)?;
+        let errata = if style.as_ref() == Path::new("paper") { errata::of_paper() } else { Vec::new() };
         let style = Style::load(style)?;
         let counted = self.counted(self.score()?);
         let cells = self.cells_of(&counted.results.episodes)?;
         let left_out = (&counted.lost, None);
         let (tables, _) = self.tables(&counted.results.episodes, left_out, &cells, &style)?;
-        Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
+        Ok(compare(choose(&tables, &published, &style)?, &published, &errata))
     }
 
     /// The files that an answer is made from: inputs, definitions and the style, if any. An output must not replace one

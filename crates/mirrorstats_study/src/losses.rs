@@ -8,10 +8,10 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use super::Study;
 use super::error::StudyError;
 use super::results::Results;
+use mirrorstats_analysis::statistics::Replies;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind};
-use mirrorstats_report::cells::group::CONDITION;
-use mirrorstats_report::statistics::Replies;
+use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::quality::{CellKey, QualityByCell};
 use mirrorstats_score::tables::builder::TableBuilder;
 use mirrorstats_score::tables::lost_counts::LostCounts;
@@ -39,7 +39,7 @@ pub(super) struct Counted {
 
 impl Counted {
     pub(super) fn replies(&self) -> Option<Replies> {
-        Replies::of(self.all.as_ref().unwrap_or(&self.results.episodes))
+        Replies::from_table(self.all.as_ref().unwrap_or(&self.results.episodes))
     }
 }
 
@@ -64,8 +64,7 @@ pub(super) fn label(results: &mut Results) {
     if let Some(quality) = quality {
         let replies = quality.take_by_episode();
         if !replies.is_empty() {
-            let text =
-                |row| replies.get(episodes.keys.get(row).episode_id).map(|[unusable, all]| format!("{unusable}/{all}"));
+            let text = |row| replies.get(episodes.keys.get(row).episode_id).map(ToString::to_string);
             let values = (0..episodes.len()).map(text).collect();
             episodes.labels.push(LabelColumn { name: UNUSABLE_REPLIES.to_owned(), values });
         }
@@ -84,7 +83,7 @@ fn count(quality: &mut QualityByCell, lost: &LostCounts, is_known: bool) {
 
 fn counts(table: &EpisodeTable) -> LostCounts {
     let mut counts = LostCounts::default();
-    for row in (0..table.len()).filter(|row| is_lost(table, *row)) {
+    for row in (0..table.len()).filter(|row| table.is_lost(*row)) {
         let key = table.keys.get(row);
         counts.add(cell(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row))));
     }
@@ -127,10 +126,6 @@ pub(super) fn told(lost: u64) -> String {
     format!("{lost} {noun} {verb} lost without an answer")
 }
 
-fn is_lost(table: &EpisodeTable, row: usize) -> bool {
-    table.label(LOST).is_some_and(|label| label.get(row) == Some(YES))
-}
-
 impl Study {
     pub(super) fn counted(&self, results: Results) -> Counted {
         let lost = counts(&results.episodes);
@@ -152,7 +147,7 @@ impl Study {
 
 fn without(results: Results, lost: LostCounts) -> Counted {
     let all = results.episodes;
-    let kept: Vec<usize> = (0..all.len()).filter(|row| !is_lost(&all, *row)).collect();
+    let kept: Vec<usize> = (0..all.len()).filter(|row| !all.is_lost(*row)).collect();
     let mut episodes = all.taken(&kept);
     episodes.labels.retain(|label| label.name != LOST);
     let timelines = results.timelines;

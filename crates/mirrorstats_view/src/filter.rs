@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use super::{Snapshot, ViewError};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_report::cells::group::CONDITION;
+use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_study::Results;
 use mirrorstats_trace::beside::labels;

@@ -12,7 +12,7 @@ use crate::cli::config::{self, Setting};
 use crate::cli::{Cli, Failure, NAME, Outcome, help, output};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::replace::Content;
-use mirrorstats_report::tables::Table;
+use mirrorstats_tables::Table;
 
 /// Show settings, write completions of a shell and manual pages
 #[derive(Debug, clap::Subcommand)]

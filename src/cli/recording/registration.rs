@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::cli::Failure;
 use crate::cli::scoring::read_plan;
 use mirrorstats_agents::prompt;
-use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_analysis::plan::register::{NamedHash, RegisteredPlan};
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::footers::declared::Registration;
 

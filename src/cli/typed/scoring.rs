@@ -7,12 +7,12 @@ use std::path::Path;
 
 use crate::cli::args::{Engine, EngineArgs, GroupingArgs, LostArg, ScoringArgs, SparkArgs, TraceArgs};
 use crate::cli::{Failure, NAME, output};
+use mirrorstats_analysis::plan::register::RegisteredPlan;
 use mirrorstats_engines::spark::Cluster;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::input;
 use mirrorstats_report::html;
-use mirrorstats_report::plan::register::RegisteredPlan;
 use mirrorstats_study::{Backend, LostAs, Question, ScoredAlike, Study, StudyError, resolve};
 use mirrorstats_trace::inputs::Input;
 

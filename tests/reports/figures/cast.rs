@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use indexmap::IndexMap;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_figures::Input;
+use mirrorstats_figures::e5_outcomes::{OutcomeRow, Outcomes};
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
-use mirrorstats_report::cells::{Cells, Group, KeyValue};
-use mirrorstats_report::figures::Input;
-use mirrorstats_report::figures::e5_outcomes::{OutcomeRow, Outcomes};
+use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
 use mirrorstats_score::timeline::Timeline;
 

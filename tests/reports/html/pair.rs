@@ -1,6 +1,6 @@
 //! The comparison of two models: the numbers of the statistics, in either order of choice.
 
-use mirrorstats_report::statistics::{PairTest, Statistics};
+use mirrorstats_analysis::statistics::{PairTest, Statistics};
 
 use crate::html::browser::Browser;
 use crate::html::scored::{PAPER_PAGE, Report};

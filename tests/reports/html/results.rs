@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mirrorstats_report::cells::KeyValue;
+use mirrorstats_score::cells::KeyValue;
 
 use crate::html::browser::Browser;
 use crate::html::scored::{PAPER_PAGE, Report};

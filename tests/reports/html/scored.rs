@@ -4,15 +4,15 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
+use mirrorstats_analysis::statistics::{Options, Statistics};
+use mirrorstats_figures::FigureName;
 use mirrorstats_report::bundle::{InputFile, Manifest};
-use mirrorstats_report::cells::Cells;
-use mirrorstats_report::cells::group::group;
-use mirrorstats_report::figures::{self, FigureName};
 use mirrorstats_report::html::{self, EmbeddedFigure, HtmlError, Page, Recordings};
 use mirrorstats_report::layout;
 use mirrorstats_report::layout::MetricTable;
-use mirrorstats_report::statistics::{Options, Statistics};
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::Cells;
+use mirrorstats_score::cells::group::group;
 use mirrorstats_score::score_traces::{self, Request};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::{inputs, read::open::TraceSet};
@@ -65,13 +65,16 @@ impl Report {
     /// The report on the bundled traces, with the figures that need only cells and episodes.
     pub fn paper() -> Self {
         let mut report = Self::bare();
-        report.statistics = Some(Statistics::of(&report.episodes, &report.cells, &Options::default()).unwrap());
-        let input = figures::Input { episodes: Some(&report.episodes), ..figures::Input::of_cells(&report.cells) };
+        report.statistics = Some(Statistics::from_table(&report.episodes, &report.cells, &Options::default()).unwrap());
+        let input = mirrorstats_figures::Input {
+            episodes: Some(&report.episodes),
+            ..mirrorstats_figures::Input::of_cells(&report.cells)
+        };
         let drawn = FigureName::ALL
             .into_iter()
             .filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes | FigureName::DoseResponse));
         let picture = |name| {
-            let drawn = figures::draw(name, &input).unwrap();
+            let drawn = mirrorstats_figures::draw(name, &input).unwrap();
             (name, drawn.caption().to_owned(), drawn.inline_svg())
         };
         report.figures = drawn.map(picture).collect();

@@ -4,9 +4,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use mirrorstats_report::bundle::{Bundle, BundleError, InputFile, Manifest, OutputFile, cells_csv, write};
-use mirrorstats_report::cells::Cells;
 use mirrorstats_report::layout::MetricTable;
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::Cells;
 
 use crate::assert_shown;
 use crate::report::published;

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use mirrorstats_report::comparison::{PublishedComparison, choose, compare};
-use mirrorstats_report::errata::Errata;
+use mirrorstats_report::published::comparison::{PublishedComparison, choose, compare};
+use mirrorstats_report::published::errata::{Erratum, of_paper};
 use mirrorstats_report::published::{Published, read};
 use mirrorstats_report::style::Style;
 
@@ -21,31 +21,31 @@ fn paper(table: &str) -> Published {
     read(Path::new(&published::path(table, "csv"))).unwrap()
 }
 
-fn against(published: &Published, errata: &Errata) -> PublishedComparison {
+fn against(published: &Published, errata: &[Erratum]) -> PublishedComparison {
     let style = Style::load("paper").unwrap();
     let tables = published::tables("paper");
-    compare(choose(&tables, published, None, &style).unwrap(), published, errata)
+    compare(choose(&tables, published, &style).unwrap(), published, errata)
 }
 
 /// The published main table after `change`, compared under the paper's errata.
 fn changed(change: impl Fn(&str) -> String) -> PublishedComparison {
     let text = fs::read_to_string(published::path("main", "csv")).unwrap();
-    against(&read(file(&change(&text)).path()).unwrap(), &Errata::of_paper())
+    against(&read(file(&change(&text)).path()).unwrap(), &of_paper())
 }
 
 #[test]
 fn all_but_two_published_cells_are_as_published() {
-    let main = against(&paper("main"), &Errata::of_paper());
+    let main = against(&paper("main"), &of_paper());
     assert!(main.holds());
     assert_shown!("fixtures/paper against fixtures/published/main_table.csv", main.render(None));
-    let appendix = against(&paper("appendix"), &Errata::of_paper());
+    let appendix = against(&paper("appendix"), &of_paper());
     assert!(appendix.holds());
     assert_eq!(appendix.render(None), "appendix: 280 cells: 280 as published, 0 excused by errata, 0 differ\n");
 }
 
 #[test]
 fn without_errata_the_two_slips_differ() {
-    let main = against(&paper("main"), &Errata::default());
+    let main = against(&paper("main"), &[]);
     assert!(!main.holds());
     assert_eq!((main.same, main.excused, main.differing), (238, 0, 2));
 }
@@ -93,44 +93,22 @@ fn cells_of_one_side_are_listed() {
 
 #[test]
 fn a_table_that_cannot_be_chosen_is_an_error() {
-    let of = |style: &str, csv: &str, name: Option<&str>| {
+    let of = |style: &str, csv: &str| {
         let published = read(file(&format!("experiment,model,metric,mean,se,emphasis\n{csv}\n")).path()).unwrap();
         let tables = published::tables(style);
-        choose(&tables, &published, name, &Style::load(style).unwrap())
+        choose(&tables, &published, &Style::load(style).unwrap())
             .map(|table| table.name.clone())
             .map_err(|e| e.to_string())
     };
-    assert_eq!(of("paper", "E1,a,TSA,1,1,", None), Ok("main".to_owned()));
-    assert_eq!(of("paper", "E1,a,TSA,1,1,", Some("appendix")), Ok("appendix".to_owned()));
-    for (style, csv, name) in [
-        ("paper", "E1,a,TTD,1,1,\nE1,a,SC,1,1,", None),
-        ("paper", "E1,a,TSA,1,1,", Some("mian")),
-        ("default", "E1,a,TSA,1,1,", None),
-    ] {
-        assert_shown!(format!("{csv} as the table {name:?} of the style {style}"), of(style, csv, name).unwrap_err());
-    }
-}
-
-#[test]
-fn errata_files_are_checked() {
-    let message = |text: &str| {
-        let file = file(text);
-        let message = Errata::read(file.path()).unwrap_err().to_string();
-        message.replace(&file.path().display().to_string(), "errata.toml")
-    };
-    let erratum = "[[erratum]]\ntable = 'main'\nexperiment = 'E1'\nmodel = 'a'\nmetric = 'TSA'\nfield = 'mean'\npublished = '1'\ncomputed = '2'\n";
-    for text in [
-        format!("{erratum}reason = ' '\n"),
-        erratum.to_owned(),
-        format!("{erratum}reason = 'x'\n").replace("'mean'", "'median'"),
-    ] {
-        assert_shown!(text.as_str(), message(&text));
+    assert_eq!(of("paper", "E1,a,TSA,1,1,"), Ok("main".to_owned()));
+    for (style, csv) in [("paper", "E1,a,TTD,1,1,\nE1,a,SC,1,1,"), ("default", "E1,a,TSA,1,1,")] {
+        assert_shown!(format!("{csv} in the style {style}"), of(style, csv).unwrap_err());
     }
 }
 
 #[test]
 fn the_answer_is_also_json() {
-    let json = serde_json::to_value(against(&paper("main"), &Errata::of_paper())).unwrap();
+    let json = serde_json::to_value(against(&paper("main"), &of_paper())).unwrap();
     assert_eq!(json["cells"], 240);
     assert_eq!(json["differences"][0]["experiment"], "E3");
     assert_eq!(json["differences"][0]["field"], "mean");

@@ -12,9 +12,9 @@ use indexmap::IndexMap;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind, Metric, StandardError};
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_report::cells::{Cell as CellOf, Cells, Group, KeyValue};
 use mirrorstats_report::layout::{self, MetricTable, Value, value};
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::{Cell as CellOf, Cells, Group, KeyValue};
 use mirrorstats_score::vocabulary::schema_columns;
 
 /// The number of episodes behind every published cell.

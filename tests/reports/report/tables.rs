@@ -5,10 +5,10 @@ use std::fs;
 
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind, StandardError};
-use mirrorstats_report::cells::{Cells, Group, KeyValue};
 use mirrorstats_report::layout::{self, MetricTable, Spread, Value};
 use mirrorstats_report::style::Style;
-use mirrorstats_report::tables::{Emphasis, Marks, Terminal};
+use mirrorstats_score::cells::{Cells, Group, KeyValue};
+use mirrorstats_tables::{Emphasis, Marks, Terminal};
 
 use crate::assert_shown;
 use crate::report::published::{self, metric_of};

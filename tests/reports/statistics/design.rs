@@ -1,8 +1,8 @@
 //! Comparisons that follow from the declared design: pairs, clusters, conditions, strata.
 
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
 use mirrorstats_metric::catalogs::catalog::Control;
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
 use mirrorstats_statistics::design::{Cluster, Design, DesignKind};
 
 use super::{
@@ -190,7 +190,7 @@ fn three_seeds_are_not_enough_for_a_claim_about_seeds_and_six_are() {
 fn the_level_of_a_warning_follows_the_confidence() {
     let table = labelled(&block("E1", "a", 10, 9), "scene", by_place);
     let options = Options { confidence: 0.8, design: CLUSTERED, ..Options::default() };
-    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     let said = found.warnings.iter().find(|warning| warning.contains("new seeds")).unwrap();
     assert!(said.contains("no test over fewer than 4 can reach p = 0.2."), "{said}");
 }
@@ -200,7 +200,7 @@ fn conditions_of_one_model_are_compared_like_models() {
     let rows = [block("E1", "a", 21, 9), block("E1", "b", 21, 9), block("E2", "a", 3, 9)].concat();
     let mut table = labelled(&rows, "condition", |row| (row.2 < 2).then(|| "pocket mirror".to_owned()));
     let text = {
-        let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+        let found = Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap();
         let family = found.models.iter().find(|family| family.experiment == "E1" && family.metric == "TSA").unwrap();
         assert_eq!(family.models, ["a [default]", "a [pocket mirror]", "b [default]", "b [pocket mirror]"]);
         assert_eq!(found.durations[0].key.condition.as_deref(), Some("default"));
@@ -212,7 +212,7 @@ fn conditions_of_one_model_are_compared_like_models() {
     };
     assert!(text.contains("a [pocket mirror]"), "{text}");
     table.labels[0].values = rows.iter().map(|_| Some("default")).collect();
-    let found = Statistics::of(&table, &cells(&table), &Options::default()).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &Options::default()).unwrap();
     assert!(!serde_json::to_string(&found).unwrap().contains("\"condition\":"), "one condition is none");
 }
 
@@ -222,17 +222,17 @@ fn declared_controls_decide_which_experiments_and_metrics_are_contrasted() {
     let rows = [block("E1", "a", 7, 9), block("E2", "a", 21, 9), block("E5", "a", 7, 9)].concat();
     let of = |found: &Statistics| -> Vec<[String; 3]> {
         let names =
-            |it: &mirrorstats_report::statistics::Contrast| [&it.baseline, &it.against, &it.metric].map(Clone::clone);
+            |it: &mirrorstats_analysis::statistics::Contrast| [&it.baseline, &it.against, &it.metric].map(Clone::clone);
         found.conditions.iter().map(names).collect()
     };
     let mut table = labelled(&rows, "scene", by_place);
     let options = Options { design: RECORDED, ..Options::default() };
-    let undeclared = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let undeclared = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     assert_eq!(of(&undeclared).len(), 4, "E1 minus E2 on each metric");
     assert!(undeclared.warnings.iter().any(|words| words.starts_with("E5 is not contrasted with E1:")));
     let control = Control { of: "E2".into(), on: vec!["TSA".into()] };
     table.catalog.experiment["E1"].control = Some(control);
-    let declared = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let declared = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     assert_eq!(of(&declared), [["E2", "E1", "TSA"].map(str::to_owned)]);
     assert!(!declared.warnings.iter().any(|words| words.contains("is not contrasted")), "{:?}", declared.warnings);
     let (before, after) = (contrast(&undeclared, "a", "TSA", "E2"), &declared.conditions[0]);

@@ -1,7 +1,7 @@
 //! Durations are compared by restricted means. Intervals are given only where their coverage is as promised.
 
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Intervals, Options, Statistics};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Intervals, Options, Statistics};
 use mirrorstats_statistics::intervals::coverage::{self, Withheld};
 use mirrorstats_statistics::intervals::interval::Interval;
 
@@ -13,7 +13,7 @@ use crate::html::scored::PAPER;
 /// 39.03883656020564; the plain means differ by 27.7.
 #[test]
 fn a_duration_is_contrasted_by_restricted_means() {
-    let found = Statistics::of(&PAPER, &cells(&PAPER), &Options::default()).unwrap();
+    let found = Statistics::from_table(&PAPER, &cells(&PAPER), &Options::default()).unwrap();
     let steps = &contrast(&found, "Gemma4 31B", "TTD", "E3").comparison;
     assert!((steps.difference.unwrap() - 8.213_235_294_117_645).abs() < 1e-9, "{steps:?}");
     let interval = steps.interval.unwrap();
@@ -26,13 +26,13 @@ fn a_duration_is_contrasted_by_restricted_means() {
 /// Not finishing is not guessing: some verdicts of TSA against chance do not hold for finished episodes alone.
 #[test]
 fn chance_is_tested_among_finished_episodes_too() {
-    let found = Statistics::of(&PAPER, &cells(&PAPER), &Options::default()).unwrap();
+    let found = Statistics::from_table(&PAPER, &cells(&PAPER), &Options::default()).unwrap();
     let of = |metric: &'static str| {
         found.chance.iter().filter(move |row| row.metric == metric && row.key.experiment != "E5")
     };
     let changed = of("TSA").filter(|row| {
         let same =
-            |other: &&mirrorstats_report::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
+            |other: &&mirrorstats_analysis::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)
     });
     assert_eq!((of("TSA").count(), changed.count()), (32, 6));
@@ -45,7 +45,7 @@ fn chance_is_tested_among_finished_episodes_too() {
 fn improvement_counts_decided_and_undecided_episodes() {
     let table = table(&study());
     let options = Options { improvements: true, ..Options::default() };
-    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     let row = found.improvements.iter().find(|row| (&*row.first, &*row.second) == ("strong", "weak")).unwrap();
     // E1: always earlier. E2: 7 of 21 at step 20 against 5 of 21 at step 60: 7/21 + 14/21 * 16/21 / 2
     let expected = (1.0 + 7.0 / 21.0 + 14.0 / 21.0 * 16.0 / 21.0 / 2.0) / 2.0;

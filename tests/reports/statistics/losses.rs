@@ -1,7 +1,7 @@
 //! Lost episodes, filters and pooling are reported with the verdicts that they affect.
 
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{AnswerRole, Comparison, Options, Selection, Statistics, Verdict};
 use mirrorstats_score::quality::CellKey;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 
@@ -33,9 +33,9 @@ fn answer<'s>(found: &'s Statistics, question: &str, metric: &str) -> &'s str {
 #[test]
 fn lost_episodes_that_could_turn_a_verdict_withhold_it() {
     let table = table(&of("a", 18, 21).chain(of("b", 2, 11)).collect::<Vec<_>>());
-    let known = Statistics::of(&table, &cells(&table), &lost_of_b(0)).unwrap();
+    let known = Statistics::from_table(&table, &cells(&table), &lost_of_b(0)).unwrap();
     assert!(test(&known, "TSA").separated && test(&known, "TSA").losses.is_none());
-    let found = Statistics::of(&table, &cells(&table), &lost_of_b(10)).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &lost_of_b(10)).unwrap();
     let losses = test(&found, "TSA").losses.unwrap();
     let p = [losses.lowest.p, losses.highest.p].map(Option::unwrap);
     assert!(!test(&found, "TSA").separated && !losses.agree && losses.lost == 10, "{losses:?}");
@@ -61,7 +61,7 @@ const BINOMIAL_OF_B: [f64; 2] = [0.019_638_567_743_686_188, 0.034_025_477_734_14
 fn a_lost_episode_counts_as_a_pair_against_a_known_outcome() {
     let rows: Vec<Row> = of("a", 21, 21).chain(of("b", 12, 21)).collect();
     let table = labelled(&rows, "scene", by_place);
-    let found = Statistics::of(&table, &cells(&table), &Options { design: RECORDED, ..lost_of_b(5) }).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &Options { design: RECORDED, ..lost_of_b(5) }).unwrap();
     let losses = test(&found, "TSA").losses.unwrap();
     assert_eq!(test(&found, "TSA").p, Some(0.003_906_25));
     assert!((losses.lowest.p.unwrap() - 0.423_950_195_312_5).abs() < 1e-12, "{losses:?}");
@@ -72,7 +72,7 @@ fn a_lost_episode_counts_as_a_pair_against_a_known_outcome() {
 #[test]
 fn a_difference_of_durations_is_kept_if_losses_cannot_turn_it() {
     let table = table(&of("a", 21, 21).chain(of("b", 1, 21)).collect::<Vec<_>>());
-    let of_lost = |count| Statistics::of(&table, &cells(&table), &lost_of_b(count)).unwrap();
+    let of_lost = |count| Statistics::from_table(&table, &cells(&table), &lost_of_b(count)).unwrap();
     let (few, many) = (of_lost(1), of_lost(200));
     assert!(test(&few, "TTD").separated && test(&few, "TTD").losses.unwrap().agree, "{:?}", test(&few, "TTD"));
     assert!(!test(&many, "TTD").separated && !test(&many, "TTD").losses.unwrap().agree, "{:?}", test(&many, "TTD"));
@@ -83,7 +83,8 @@ fn each_answer_names_a_filter_by_results_and_pooling() {
     let table = table(&of("a", 21, 21).collect::<Vec<_>>());
     let selection = Some(Selection { condition: "TSA = 1".into(), by_results: true });
     let caveats = vec!["recordings are pooled".to_owned()];
-    let found = Statistics::of(&table, &cells(&table), &Options { selection, caveats, ..Options::default() }).unwrap();
+    let found =
+        Statistics::from_table(&table, &cells(&table), &Options { selection, caveats, ..Options::default() }).unwrap();
     assert_eq!(found.chance[0].verdict, Verdict::Above);
     let expected = ["episodes chosen by their results: `TSA = 1`", "recordings are pooled"];
     assert!(found.answers.iter().all(|answer| answer.caveats == expected), "{:?}", found.answers);
@@ -104,7 +105,7 @@ fn the_primary_answer_comes_first_and_families_are_counted() {
     assert!(text.contains("within each of 4 families of tests; the first answer is primary"), "{text}");
     let table = table(&rows);
     let options = Options { primary: Some("TTD".into()), ..Options::default() };
-    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     assert_eq!((found.answers[0].metric.as_str(), found.answers[0].role), ("TTD", AnswerRole::Primary));
 }
 

@@ -1,7 +1,7 @@
 //! Scenes, seeds or participants with several episodes count once each.
 
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
 
 use super::{CLUSTERED, RECORDED, Row, by_place, cells, labelled, with_scenes};
 
@@ -57,7 +57,7 @@ fn declared_seeds_are_the_unit_of_every_test() {
 fn episodes_of_one_participant_count_as_one() {
     let table = labelled(&opposed(3, 7), "participant", |row| Some(row.1.to_owned()));
     let options = Options { design: RECORDED, ..Options::default() };
-    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     assert!(found.answers.iter().any(|answer| answer.answer == "E1 cannot say: 1 participant"), "{:?}", found.answers);
     assert!(found.chance.iter().all(|row| row.verdict == Verdict::NotSeparated));
 }
@@ -73,7 +73,7 @@ fn people_on_shared_scenes_count_by_participant() {
         .labels
         .extend(labelled(&rows, "participant", person).labels.into_iter().filter(|label| label.name == "participant"));
     let options = Options { design: RECORDED, ..Options::default() };
-    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let found = Statistics::from_table(&table, &cells(&table), &options).unwrap();
     assert!(found.retests.is_empty(), "{:?}", found.retests);
     let row = found.chance.iter().find(|row| row.key.model == "people" && row.metric == "TSA").unwrap();
     assert_eq!(row.units.as_ref().map(|units| (units.n, units.name.as_str())), Some((8, "participants")));

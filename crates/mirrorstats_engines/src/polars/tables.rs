@@ -9,7 +9,7 @@ use polars::prelude::{
 
 use super::run::{PolarsError, collect};
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_report::cells::{Cell, Cells, KeyValue};
+use mirrorstats_score::cells::{Cell, Cells, KeyValue};
 use mirrorstats_score::tables::select::{is_of_coders, truths_of};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, MetricColumn};
 use mirrorstats_score::vocabulary::kind_in;

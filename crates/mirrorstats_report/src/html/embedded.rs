@@ -12,8 +12,8 @@ use super::command::{Recordings, quoted};
 use super::filter::shown;
 use super::pair::pairs;
 use super::{HtmlError, Page};
-use crate::cells::group::membership;
 use mirrorstats_exact::escape::visible;
+use mirrorstats_score::cells::group::membership;
 
 /// JavaScript's largest safe integer: it represents all smaller ones exactly.
 const LARGEST_SAFE: u64 = (1 << 53) - 1;

@@ -3,9 +3,9 @@
 use indexmap::IndexSet;
 use serde_json::{Value as Json, json};
 
-use crate::cells::{Cells, KeyValue};
 use crate::layout::{MetricTable, heading};
 use mirrorstats_exact::escape::visible;
+use mirrorstats_score::cells::{Cells, KeyValue};
 
 #[derive(Debug)]
 pub(super) struct Filters {

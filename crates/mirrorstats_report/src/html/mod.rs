@@ -16,12 +16,12 @@ mod pair;
 mod template;
 
 use crate::bundle::Manifest;
-use crate::cells::Cells;
-use crate::cells::group::GroupError;
 use crate::layout::MetricTable;
-use crate::statistics::Statistics;
-use crate::tables::ListTable;
+use mirrorstats_analysis::statistics::Statistics;
+use mirrorstats_score::cells::Cells;
+use mirrorstats_score::cells::group::GroupError;
 use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_tables::ListTable;
 
 pub use command::{Recordings, word};
 pub use definitions::metrics;
@@ -70,7 +70,7 @@ pub fn sections(page: &Page<'_>, names: &[&str]) -> Result<Vec<String>, HtmlErro
 }
 
 pub fn style_sheet() -> String {
-    format!("{}\n{}", crate::figures::font_style_sheet(), template::STYLE)
+    format!("{}\n{}", mirrorstats_figures::font_style_sheet(), template::STYLE)
 }
 
 pub fn render(page: &Page<'_>) -> Result<String, HtmlError> {

@@ -10,20 +10,20 @@ use super::filter::{Filters, shown};
 use super::template::markup;
 use super::{EmbeddedFigure, HtmlError, Page, definitions, embedded, pair};
 use crate::bundle::Manifest;
-use crate::cells::group::group;
-use crate::cells::{Cell, Cells};
-use crate::figures;
 use crate::layout::{self, MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, heading, row_key};
-use crate::statistics::Statistics;
-use crate::statistics::text::Length;
-use crate::tables::{DAGGER, Emphasis, ListTable};
+use mirrorstats_analysis::statistics::Statistics;
+use mirrorstats_analysis::statistics::text::Length;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::{Decimal, full_precision};
 use mirrorstats_exact::ratio::Ratio;
+use mirrorstats_figures as figures;
 use mirrorstats_metric::catalogs::catalog::{Better, Kind, Metric};
+use mirrorstats_score::cells::group::group;
+use mirrorstats_score::cells::{Cell, Cells};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef};
 use mirrorstats_statistics::intervals::interval::Interval;
+use mirrorstats_tables::{DAGGER, Emphasis, ListTable};
 
 pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
     if group(page.episodes, &page.cells.by)? != *page.cells {

@@ -8,9 +8,9 @@ use std::collections::BTreeSet;
 use indexmap::IndexSet;
 use serde_json::{Value as Json, json};
 
-use crate::statistics::Statistics;
-use crate::statistics::text::pairs::{FamilyText, PairText, families};
-use crate::statistics::text::percent;
+use mirrorstats_analysis::statistics::Statistics;
+use mirrorstats_analysis::statistics::text::pairs::{FamilyText, PairText, families};
+use mirrorstats_analysis::statistics::text::percent;
 use mirrorstats_exact::escape::visible;
 
 /// The most tests in a page, about 700 kB: fifty models have more than a thousand pairs under each metric.
@@ -28,7 +28,7 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
         return Json::Null;
     }
     let place = |list: &[&str], name: &str| list.binary_search(&name).unwrap_or_default();
-    let told = |test: &PairText<'_>| {
+    let row = |test: &PairText<'_>| {
         let places = [place(&models, test.first), place(&models, test.second), place(&methods, test.test)];
         let spelled = test.sides.iter().flatten().chain(&test.p).map(|text| json!(text));
         places.into_iter().map(Json::from).chain(spelled).chain([json!(test.verdict)]).collect::<Json>()
@@ -37,18 +37,18 @@ pub(super) fn pairs(statistics: Option<&Statistics>) -> Json {
         json!({
             "experiment": family.experiment.map(visible),
             "metric": visible(family.metric),
-            "tests": family.tests.iter().map(told).collect::<Vec<_>>(),
+            "tests": family.tests.iter().map(row).collect::<Vec<_>>(),
         })
     };
-    let mut told = json!({
+    let mut pairs = json!({
         "models": models.iter().map(|name| visible(name)).collect::<Vec<_>>(),
         "methods": methods,
         "families": families.iter().map(family).collect::<Vec<_>>(),
     });
     if left_out > 0 {
-        told["left_out"] = left_out.into();
+        pairs["left_out"] = left_out.into();
     }
-    told
+    pairs
 }
 
 /// The families that fit on a page, and the number of others: those over all experiments first, then by metric.

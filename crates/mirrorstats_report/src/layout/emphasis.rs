@@ -7,8 +7,8 @@ use std::cmp::Ordering;
 
 use super::MetricCell;
 use crate::style::EmphasisRule;
-use crate::tables::Emphasis;
 use mirrorstats_metric::catalogs::catalog::Better;
+use mirrorstats_tables::Emphasis;
 
 pub(crate) fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: EmphasisRule) {
     let compare: fn(&MetricCell, &MetricCell) -> Ordering = match rule {
@@ -73,10 +73,10 @@ mod tests {
     use super::{compare_fractions, emphasise};
     use crate::layout::{MetricCell, Value};
     use crate::style::EmphasisRule::{self, ExactMean, PrintedMean};
-    use crate::tables::Emphasis;
     use mirrorstats_exact::moments::Moments;
     use mirrorstats_exact::number::Decimal;
     use mirrorstats_metric::catalogs::catalog::Better::{self, Higher, Lower, Neither};
+    use mirrorstats_tables::Emphasis;
 
     /// Cells of (sum, n), printed with two digits; n = 0 is undefined. Each letter of the expected text is a cell.
     fn check(of: &[(i128, u64)], better: Better, rule: EmphasisRule, expected: &str) {

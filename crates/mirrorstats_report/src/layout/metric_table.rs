@@ -3,14 +3,15 @@
 //! Rule: all decisions are already made here (columns, order, rounding, emphasis, marks). [`MetricTable::printed`] is
 //! for people, [`MetricTable::records`] for programs.
 
-use crate::cells::KeyValue;
-use crate::cells::group::CONDITION;
-use crate::statistics::Ranks;
+use crate::layout::key_field;
 use crate::style::CellForm;
-use crate::tables::{Align, Column, Emphasis, ListTable, Look, RowGroup, Table, TableCell, key_field};
+use mirrorstats_analysis::statistics::Ranks;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::Better;
+use mirrorstats_score::cells::KeyValue;
+use mirrorstats_score::cells::group::CONDITION;
+use mirrorstats_tables::{Align, Column, Emphasis, ListTable, Look, RowGroup, Table, TableCell};
 
 /// A table of cells under a style.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,11 +9,11 @@ mod order;
 pub mod quality;
 pub mod value;
 
-use crate::cells::{Cells, Group, KeyValue};
 use crate::style::{EmphasisRule, MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
-use crate::tables::{DAGGER, Emphasis};
 use mirrorstats_metric::catalogs::catalog::Catalog;
+use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_statistics::intervals::coverage::STUDENT;
+use mirrorstats_tables::{DAGGER, Emphasis, text_field};
 
 use self::emphasis::emphasise;
 pub use self::metric_table::{MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, Spread, Value};
@@ -27,6 +27,14 @@ pub fn tables(cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StyleErr
     style.check_against(&cells.catalog)?;
     let sheets = sheets(cells, style);
     Ok(sheets.iter().map(|(name, sheet)| Layout::new(cells, style, sheet).table(name, sheet)).collect())
+}
+
+/// A key as a field of a CSV file.
+pub(crate) fn key_field(value: &KeyValue) -> String {
+    match value {
+        KeyValue::Text(text) => text_field(text),
+        value => value.to_string(),
+    }
 }
 
 /// The most metrics in `main` that the style does not name: its columns have to fit on a page.

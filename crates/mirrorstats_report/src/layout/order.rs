@@ -3,10 +3,10 @@
 //! Rule: experiments are ordered by the definitions, models and metrics by the style, everything else by value. So a
 //! list beside a table has the same order.
 
-use crate::cells::KeyValue;
-use crate::cells::diff::Changes;
 use crate::style::{MAIN_TABLE, Style};
+use mirrorstats_analysis::changes::Changes;
 use mirrorstats_metric::catalogs::catalog::Catalog;
+use mirrorstats_score::cells::KeyValue;
 
 #[derive(Clone, Copy, Debug)]
 pub struct TableOrder<'a> {

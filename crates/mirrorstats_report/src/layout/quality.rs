@@ -4,11 +4,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::cells::KeyValue;
-use crate::tables::{Column, ListTable, Look, Table, key_field};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::fixed;
 use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, statuses};
+use mirrorstats_tables::{Column, ListTable, Look, Table, text_field};
 
 const NAME: &str = "quality";
 const UNKNOWN: &str = "--";
@@ -131,7 +130,7 @@ fn records(cells: &QualityByCell, keys: usize) -> Table {
 #[expect(clippy::cast_precision_loss, reason = "nine decimal places of a cost")]
 fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
     let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys);
-    let names = names.map(|name| key_field(&KeyValue::Text(name.clone())));
+    let names = names.map(|name| text_field(name));
     let recorded = quality.replies() > 0;
     let count = |count: u64| if recorded { count.to_string() } else { String::new() };
     let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
@@ -164,8 +163,8 @@ fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::of_cells;
-    use crate::tables::ListTable;
     use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, Total};
+    use mirrorstats_tables::ListTable;
 
     fn cells(condition: &str) -> QualityByCell {
         let key = |model: &str| CellKey { experiment: "E1".into(), model: model.into(), condition: condition.into() };

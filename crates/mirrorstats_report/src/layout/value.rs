@@ -1,11 +1,11 @@
 //! From moments to displayed values, under a style's rules.
 
 use super::{Spread, Value};
-use crate::cells::Cell;
 use crate::style::{CellForm, Print, Rounding, SingleSe};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::{Kind, Metric, StandardError};
+use mirrorstats_score::cells::Cell;
 use mirrorstats_statistics::intervals::interval::Interval;
 
 pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {

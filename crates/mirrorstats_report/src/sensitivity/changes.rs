@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Level, Reference};
-use crate::statistics::{ChanceRow, Contrast, Family, Role, Sign, Statistics, Verdict};
+use mirrorstats_analysis::statistics::{ChanceRow, Contrast, Family, Role, Sign, Statistics, Verdict};
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog};
 
 /// The question behind a conclusion.

@@ -10,14 +10,15 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::statistics::Statistics;
 use super::style::Style;
-use crate::cells::{Cell, Cells, Group, KeyValue};
 use crate::layout::MetricTable;
-use crate::tables::{Table, Terminal, escape_markdown, key_field, wrapped};
+use crate::layout::key_field;
+use mirrorstats_analysis::statistics::Statistics;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::number::full_precision;
 use mirrorstats_metric::catalogs::catalog::Kind;
+use mirrorstats_score::cells::{Cell, Cells, Group, KeyValue};
+use mirrorstats_tables::{Table, Terminal, escape_markdown, wrapped};
 
 pub use changes::{Change, Question, Says};
 
@@ -115,7 +116,7 @@ impl Sensitivity {
     ///
     /// # Panics
     /// If there are no levels.
-    pub fn of(
+    pub fn from_levels(
         levels: &[Level],
         reference: &Reference,
         metrics: &[String],

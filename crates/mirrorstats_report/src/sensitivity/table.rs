@@ -1,12 +1,12 @@
 //! The table: a group of rows per experiment and model, one row per threshold, one column per metric.
 
 use super::{Level, Reference};
-use crate::cells::{Cell, Group, KeyValue};
 use crate::layout::{MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, Spread, TableOrder, Value};
 use crate::style::{CellForm, Style, TableSheet};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::{Better, Kind, Metric};
+use mirrorstats_score::cells::{Cell, Group, KeyValue};
 
 const NOTE: &str = "Mirror evidence is in view where at least so many pixels show the own body by way of the mirror. Rates are \
                     counts of the episodes where the metric is defined; other values are means, n given where it is not \

@@ -12,8 +12,8 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::figures::shown::FigureSheets;
 use mirrorstats_exact::suggest::nearest;
+use mirrorstats_figures::shown::FigureSheets;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind};
 use mirrorstats_toml_spec::{Fault, Faults, Place};
 

@@ -9,11 +9,11 @@ use std::path::Path;
 use toml::Value;
 
 use super::{MAIN_TABLE, OTHER_TABLE, StyleError, StyleSheet};
-use crate::figures::shown::FIGURES;
-use crate::figures::{FigureError, FigureName};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::suggest::hint;
+use mirrorstats_figures::shown::FIGURES;
+use mirrorstats_figures::{FigureError, FigureName};
 use mirrorstats_toml_spec::{At, Fault, FileKind, Place, Shape, lay};
 
 /// The style that others start from.

@@ -1,5 +1,6 @@
 //! The episode table: one row per episode, its keys and one integer per metric, in Arrow columns.
 
+use std::fmt;
 use std::ops::Range;
 
 use arrow::array::{
@@ -42,8 +43,34 @@ pub const CONDITION: &str = "condition";
 /// The label of episodes that were lost because no answer came.
 pub const LOST: &str = "lost";
 
-/// The label of an episode's unusable replies: the number without a decision, of all replies, such as `3/20`.
+/// The label of an episode's [`UnusableCount`].
 pub const UNUSABLE_REPLIES: &str = "unusable_replies";
+
+/// The replies of an episode: those without a decision, and all. As a label, and in score files: `3/20`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct UnusableCount {
+    pub unusable: u64,
+    pub replies: u64,
+}
+
+impl fmt::Display for UnusableCount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.unusable, self.replies)
+    }
+}
+
+impl UnusableCount {
+    pub fn add(&mut self, other: Self) {
+        self.unusable = self.unusable.saturating_add(other.unusable);
+        self.replies = self.replies.saturating_add(other.replies);
+    }
+
+    /// The count that a label spells; `None` for any other text.
+    pub fn of_label(label: &str) -> Option<Self> {
+        let (unusable, replies) = label.split_once('/')?;
+        Some(Self { unusable: unusable.parse().ok()?, replies: replies.parse().ok()? })
+    }
+}
 
 /// The key of an episode. The derived order is the order of the table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -124,6 +151,11 @@ impl EpisodeTable {
             labels: self.labels.iter().map(|label| label.name.clone()).collect(),
             metrics: self.metrics.iter().map(|metric| metric.name.clone()).collect(),
         }
+    }
+
+    /// Returns true if the episode was lost: the label [`LOST`] says so.
+    pub fn is_lost(&self, row: usize) -> bool {
+        self.label(LOST).is_some_and(|label| label.get(row) == Some("true"))
     }
 
     /// Returns true if any episode was recorded under a condition other than the default.

@@ -12,11 +12,11 @@ use std::path::{Path, PathBuf};
 use crate::error::StudyError;
 use crate::inputs::{ScoreFile, Source, Stamp};
 use crate::{LostAs, Question, Study, own_definitions, scores};
+use mirrorstats_analysis::changes::{Changes, Flip, Overlap};
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
-use mirrorstats_report::cells::diff::{Changes, Flip, Overlap};
-use mirrorstats_report::cells::group::DEFAULT_BY;
 use mirrorstats_report::layout::TableOrder;
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::group::DEFAULT_BY;
 use mirrorstats_score::error::ScoreError;
 use mirrorstats_score::evidence::{self, Evidence};
 use mirrorstats_score::score_traces;
@@ -259,7 +259,7 @@ impl Pair {
     }
 
     pub(crate) fn changes(&self, by: &[String], style: &Style) -> Result<Changes, StudyError> {
-        let mut changes = Changes::of(&self.before.table, &self.after.table, by)?;
+        let mut changes = Changes::between(&self.before.table, &self.after.table, by)?;
         changes.metrics = Overlap::of(&self.before.metrics, &self.after.metrics);
         TableOrder { catalog: &self.after.table.catalog, style }.sort(&mut changes);
         Ok(changes)

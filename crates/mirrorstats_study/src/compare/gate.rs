@@ -11,9 +11,9 @@ use crate::error::StudyError;
 use crate::inputs::Source;
 use crate::output::statistics::{check_verdicts, design_of};
 use crate::{Study, pooled};
+use mirrorstats_analysis::gate::{FlippedPair, Gate, GateOptions, Played};
 use mirrorstats_metric::catalogs::catalog::{Better, Metric};
 use mirrorstats_metric::definitions::UnknownMetric;
-use mirrorstats_report::gate::{FlippedPair, Gate, GateOptions, Played};
 use mirrorstats_score::evidence;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::inputs::{self, Input};
@@ -29,7 +29,7 @@ impl Study {
     pub fn gate(&self, base: &Self, options: &GateOptions) -> Result<Gate, StudyError> {
         let (old, new) = (base.gated(options)?, self.gated(options)?);
         let design = design_of(&old.declared.clone().joined(new.declared.clone()));
-        let mut gate = Gate::of([&old, &new], design, options)?;
+        let mut gate = Gate::between([&old, &new], design, options)?;
         gate.caveats.extend(self.selection(&new).map(|selection| selection.sentence()));
         for (study, table) in [(base, &old), (self, &new)].into_iter().filter(|_| options.pool) {
             gate.caveats.extend(pooled::told(table, &study.question.by_over(table))?);

@@ -6,9 +6,9 @@
 use std::collections::BTreeMap;
 
 use crate::error::StudyError;
+use mirrorstats_analysis::comparable::{FINGERPRINT, Recorded, Varied, difference};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_report::cells::group::{CONDITION, membership};
-use mirrorstats_report::comparable::{FINGERPRINT, Recorded, Varied, difference};
+use mirrorstats_score::cells::group::{CONDITION, membership};
 use mirrorstats_score::tables::table::EpisodeTable;
 
 fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {

@@ -12,15 +12,12 @@ use crate::losses::{self, Counted};
 use crate::results::Results;
 use crate::scan::{ids, lost_episodes};
 use crate::{Question, Study, own_definitions};
+use mirrorstats_analysis::statistics::Options;
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::{Definitions, ReplaceError};
-use mirrorstats_report::cells::group::{DEFAULT_BY, group};
-use mirrorstats_report::cells::{Cells, Group};
-use mirrorstats_report::figures::Figure;
-use mirrorstats_report::figures::sensitivity::{self as drawing, Stage};
 use mirrorstats_report::sensitivity::{Level, Reference, Sensitivity};
-use mirrorstats_report::statistics::Options;
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::{Cells, Group};
 use mirrorstats_score::physical::PhysicalPlan;
 use mirrorstats_score::score_traces::{self, Outputs};
 use mirrorstats_score::tables::table::EpisodeTable;
@@ -64,7 +61,6 @@ impl FromStr for Thresholds {
 #[derive(Debug)]
 pub struct SensitivityReport {
     pub found: Sensitivity,
-    pub figure: Figure,
     pub notes: Vec<String>,
 }
 
@@ -81,18 +77,10 @@ impl Study {
         let scored = self.scan_trial(&trial, traces);
         self.check_unchanged()?;
         let stages = self.stages(&trial, scored?)?;
-        let lost = stages.first().map_or(0, |stage| stage.lost);
-        let levels: Vec<Level> = stages.iter().map(|stage| stage.level.clone()).collect();
-        let found = Sensitivity::of(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
-        let labels: Vec<Stage<'_>> =
-            stages.iter().map(|stage| Stage { px: stage.level.px, cells: &stage.drawn }).collect();
-        let drawn = drawing::SensitivityInput {
-            stages: &labels,
-            metrics: &trial.moved,
-            order: &style.sheet.row_order,
-            reference: &trial.reference.words(),
-        };
-        Ok(SensitivityReport { found, figure: drawing::draw(&drawn)?, notes: trial.notes(lost) })
+        let lost = stages.first().map_or(0, |(_, lost)| *lost);
+        let levels: Vec<Level> = stages.into_iter().map(|(level, _)| level).collect();
+        let found = Sensitivity::from_levels(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
+        Ok(SensitivityReport { found, notes: trial.notes(lost) })
     }
 
     fn scan_trial(&self, trial: &Trial, traces: &TraceSet) -> Result<Vec<EpisodeTable>, StudyError> {
@@ -105,7 +93,8 @@ impl Study {
         Ok(tables)
     }
 
-    fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<ScoredLevel>, StudyError> {
+    /// The results of each threshold, with the number of lost episodes.
+    fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<(Level, u64)>, StudyError> {
         let mut others = tables.split_off(trial.definitions.len()).into_iter();
         let pixels = others.next();
         let lost = others.next().map(|table| ids(&table));
@@ -127,22 +116,14 @@ impl Study {
         Ok(self.counted(results))
     }
 
-    fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<ScoredLevel, StudyError> {
+    fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<(Level, u64), StudyError> {
         let cells = self.cells_of(&counted.results.episodes)?;
         // Conclusions need no intervals of cells; their bootstraps would take most of the time.
         let none = |group: &Group| Group { moments: Vec::new(), ..group.clone() };
         let bare = Cells { metrics: Vec::new(), groups: cells.groups.iter().map(none).collect(), ..cells.clone() };
         let statistics = self.statistics_of(counted, &bare, &Options::default())?;
-        let shown = counted.results.with_conditions_as_models();
-        let drawn = group(&shown.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(ScoredLevel { level: Level { px, cells, statistics }, drawn, lost: counted.lost.total() })
+        Ok((Level { px, cells, statistics }, counted.lost.total()))
     }
-}
-
-struct ScoredLevel {
-    level: Level,
-    drawn: Cells,
-    lost: u64,
 }
 
 struct Trial {

@@ -12,8 +12,8 @@ use crate::{Question, Study, scores};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_metric::names::mentioned;
-use mirrorstats_report::cells::KeyValue;
-use mirrorstats_report::cells::group::{KEY_COLUMNS, column_values};
+use mirrorstats_score::cells::KeyValue;
+use mirrorstats_score::cells::group::{KEY_COLUMNS, column_values};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::{score_traces, vocabulary};
 

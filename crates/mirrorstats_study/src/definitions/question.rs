@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_report::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS};
+use mirrorstats_score::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::{score_traces, vocabulary};
 use mirrorstats_trace::read::open::TraceSet;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::StudyError;
 use mirrorstats_exact::rounding::Rounding;
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_report::audit::{Audit, audit};
+use mirrorstats_report::published::audit::{Audit, audit};
 use mirrorstats_report::published::{self, Published};
 use mirrorstats_score::vocabulary::schema_columns;
 

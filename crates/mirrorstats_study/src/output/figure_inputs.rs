@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use crate::error::StudyError;
 use crate::results::Results;
+use mirrorstats_figures::{Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle::OutputFile;
-use mirrorstats_report::cells::Cells;
-use mirrorstats_report::cells::group::{DEFAULT_BY, group};
-use mirrorstats_report::figures::{self, Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
 use mirrorstats_report::html;
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::Cells;
+use mirrorstats_score::cells::group::{DEFAULT_BY, group};
 
 /// The options of a figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,8 +21,6 @@ pub struct FigureOptions {
     pub style: PathBuf,
     /// The metrics shown, in the order of their roles; the style's metrics if None.
     pub metrics: Option<Vec<String>>,
-    /// A custom heading.
-    pub title: Option<String>,
     /// The printed width; the drawn width if None.
     pub width: Option<FigureWidth>,
     /// The number of models to show, the best by their means of the first metric over all experiments; all if None.
@@ -31,7 +29,7 @@ pub struct FigureOptions {
 
 impl Default for FigureOptions {
     fn default() -> Self {
-        Self { style: PathBuf::from("default"), metrics: None, title: None, width: None, top: None }
+        Self { style: PathBuf::from("default"), metrics: None, width: None, top: None }
     }
 }
 
@@ -70,7 +68,7 @@ impl<'a> FigureInputs<'a> {
         let models: BTreeSet<&str> = all.results.episodes.keys.iter().map(|key| key.model).collect();
         let Some((metric, _)) = metric.filter(|_| models.len() > MANY_MODELS) else { return Ok(all) };
         let remark = format!("The best {SHOWN_OF_MANY} of {} models by {metric}.", models.len());
-        let results: Cow<'_, Results> = Cow::Owned(all.results.into_owned().of_the_best(SHOWN_OF_MANY, metric));
+        let results: Cow<'_, Results> = Cow::Owned(all.results.into_owned().top_models(SHOWN_OF_MANY, metric));
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
         Ok(Self { cells, style, options: FigureOptions::default(), results, remark: Some(remark) })
     }
@@ -80,7 +78,7 @@ impl<'a> FigureInputs<'a> {
     }
 
     pub(crate) fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
-        figures::draw(name, &self.input())
+        mirrorstats_figures::draw(name, &self.input())
     }
 
     pub(crate) fn draw_all(&self) -> Drawings {
@@ -104,7 +102,6 @@ impl<'a> FigureInputs<'a> {
             episodes: Some(&self.results.episodes),
             outcomes: self.results.outcomes.as_ref(),
             timelines: self.results.timelines.as_deref(),
-            title: self.options.title.as_deref(),
             width: self.options.width,
         }
     }

@@ -5,12 +5,12 @@ use crate::error::StudyError;
 use crate::figure_inputs::FigureInputs;
 use crate::losses::Counted;
 use crate::results::Results;
+use mirrorstats_analysis::statistics::Options;
 use mirrorstats_report::bundle::Manifest;
-use mirrorstats_report::cells::{Cells, KeyValue};
 use mirrorstats_report::html::{self, Page};
 use mirrorstats_report::layout::quality;
-use mirrorstats_report::statistics::Options;
 use mirrorstats_report::style::Style;
+use mirrorstats_score::cells::{Cells, KeyValue};
 use mirrorstats_trace::schema::SCHEMA_VERSION;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

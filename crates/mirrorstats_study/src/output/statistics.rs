@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mirrorstats_analysis::plan::departures::Looks;
+use mirrorstats_analysis::statistics::{Options, Selection, Sequential, Statistics};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_metric::names::is_about;
-use mirrorstats_report::cells::Cells;
-use mirrorstats_report::plan::departures::Looks;
-use mirrorstats_report::statistics::{Options, Selection, Sequential, Statistics};
+use mirrorstats_score::cells::Cells;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{CONDITION, EpisodeTable};
 use mirrorstats_score::vocabulary;
@@ -74,7 +74,7 @@ impl Study {
         let copies = self.copies(&results.episodes)?;
         let copy_phrase = copies.as_ref().map(|copies| copies.phrase.clone());
         options.caveats = as_failures.into_iter().chain(departed).chain(copy_phrase).collect();
-        let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
+        let mut statistics = Statistics::from_table(&results.episodes, cells, &options)?;
         statistics.departures = departures;
         if let Some(total) = failures {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
@@ -92,7 +92,7 @@ impl Study {
         let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
         let options = Options { design, selection, pooled: self.pooled(&episodes)?, ..options.clone() };
         let departures = self.departures(&episodes, &options, Looks::Any);
-        Ok(Sequential { departures, ..Sequential::of(&episodes, &options)? })
+        Ok(Sequential { departures, ..Sequential::from_table(&episodes, &options)? })
     }
 }
 

@@ -106,7 +106,7 @@ fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
     let bytes = fs::read(&path).map_err(|source| VerifyError::Unreadable { path: path.clone(), source })?;
     let manifest: Listed = serde_json::from_slice(&bytes).map_err(|error| malformed(error.to_string()))?;
     if manifest.outputs.is_empty() {
-        return Err(malformed("one that lists no outputs, as those of earlier versions".to_owned()));
+        return Err(malformed("one that lists no outputs".to_owned()));
     }
     let mut listed = BTreeMap::new();
     for output in manifest.outputs {

@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
+use mirrorstats_figures::e5_outcomes::Outcomes;
+use mirrorstats_figures::{FigureName, gaze};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle;
-use mirrorstats_report::cells::group::CONDITION;
-use mirrorstats_report::figures::e5_outcomes::Outcomes;
-use mirrorstats_report::figures::{FigureName, gaze};
+use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::quality::QualityByCell;
 use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
 use mirrorstats_score::timeline::Timeline;
@@ -90,7 +90,7 @@ impl Results {
             let shown = self.with_conditions_as_models();
             let answered =
                 shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
-            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&shown.episodes, &answered));
+            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::from_table(&shown.episodes, &answered));
             self.outcomes = outcomes;
         }
         if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
@@ -99,7 +99,7 @@ impl Results {
     }
 
     /// The results of the `most` best models by a metric.
-    pub(crate) fn of_the_best(self, most: usize, metric: &str) -> Self {
+    pub(crate) fn top_models(self, most: usize, metric: &str) -> Self {
         let episodes = &self.episodes;
         let Some(column) = episodes.metric(metric) else { return self };
         let mut means = model_means(episodes, column);

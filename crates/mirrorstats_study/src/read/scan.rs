@@ -10,7 +10,7 @@ use crate::question::STANDING_LABELS;
 use crate::results::{Outputs, Results};
 use crate::{Backend, Study, losses, own_definitions, scores};
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_report::cells::group::CONDITION;
+use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::quality::{QualityByCell, QualityReader};
 use mirrorstats_score::score_traces::{self, Scored};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, LabelColumn};

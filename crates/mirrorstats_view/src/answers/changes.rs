@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use crate::{Snapshot, ViewError};
+use mirrorstats_analysis::changes::Flip;
 use mirrorstats_exact::escape::visible;
-use mirrorstats_report::cells::diff::Flip;
 use mirrorstats_study::{DiffRequest, Side, diff};
 
 pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {

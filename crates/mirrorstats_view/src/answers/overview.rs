@@ -137,7 +137,7 @@ fn scanned(snapshot: &Snapshot, scored: &Scored, filter: &Filter, part: Part) ->
     let condition = filter.as_condition(snapshot, options.question.filter.as_deref())?;
     let question = Question { filter: condition, ..options.question.clone() };
     let study = Scored::study(options, scored.inputs.clone(), question)?;
-    let figures = if part == Part::Figures { mirrorstats_report::figures::FigureName::ALL.as_slice() } else { &[] };
+    let figures = if part == Part::Figures { mirrorstats_figures::FigureName::ALL.as_slice() } else { &[] };
     let outputs = Outputs { losses: true, ..Outputs::of_figures(figures) };
     Ok(study.overview(study.scan(outputs)?, &options.style, part)?)
 }

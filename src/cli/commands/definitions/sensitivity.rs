@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::replace::Content;
-use mirrorstats_report::figures::FigureFormat;
 use mirrorstats_study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
 
 /// Show how every cell depends on the threshold of mirror evidence, and where a conclusion changes
@@ -24,12 +23,9 @@ pub struct SensitivityArgs {
     /// Allow episodes with different settings in one cell
     #[arg(long)]
     pub pool: bool,
-    /// Write sensitivity.csv, .md and .tex, and the figure in every format, into this folder
+    /// Write sensitivity.csv, .md and .tex into this folder
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write the figure here; the ending says the format
-    #[arg(long, value_name = "FILE")]
-    pub figure: Option<PathBuf>,
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -40,19 +36,14 @@ const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex
 
 impl SensitivityArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        // Refuse an unknown format before a pass over the traces.
-        let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
         let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let mut targets = self.out.iter().flat_map(|out| names().map(|name| out.join(name))).chain(self.figure.clone());
+        let mut targets = self.out.iter().flat_map(|out| TABLES.map(|name| out.join(name)));
         targets.try_for_each(|path| output::check_target(&path, study.files_read(None)))?;
         if let Some(out) = &self.out {
             study.check_out(out)?;
         }
         let report = study.sensitivity(&self.thresholds)?;
         output::notes(&report.notes);
-        if let (Some(path), Some(format)) = (&self.figure, format) {
-            output::write_file(path, &format.encode(&report.figure).map_err(Failure::input)?)?;
-        }
         if let Some(out) = &self.out {
             write(out, &report)?;
         }
@@ -60,19 +51,9 @@ impl SensitivityArgs {
     }
 }
 
-fn names() -> impl Iterator<Item = PathBuf> {
-    let figures = FigureFormat::ALL.iter().map(|format| format!("figures/sensitivity.{}", format.ending()).into());
-    TABLES.into_iter().map(PathBuf::from).chain(figures)
-}
-
 fn write(out: &Path, report: &SensitivityReport) -> Result<(), Failure> {
     let found = &report.found;
-    let mut contents = vec![found.csv().into_bytes(), found.markdown().into_bytes(), found.latex().into_bytes()];
-    for format in FigureFormat::ALL {
-        contents.push(format.encode(&report.figure).map_err(Failure::input)?);
-    }
-    let names: Vec<PathBuf> = names().collect();
-    let files: Vec<_> =
-        names.iter().map(PathBuf::as_path).zip(contents.iter().map(|bytes| Content::Bytes(bytes))).collect();
-    output::write_folder(out, &files)
+    let contents = [found.csv(), found.markdown(), found.latex()];
+    let files = TABLES.iter().zip(&contents).map(|(name, text)| (Path::new(name), Content::Bytes(text.as_bytes())));
+    output::write_folder(out, &files.collect::<Vec<_>>())
 }

@@ -6,9 +6,8 @@ use std::path::PathBuf;
 
 use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
-use mirrorstats_report::cells::diff::Changes;
-use mirrorstats_report::cells::group::DEFAULT_BY;
-use mirrorstats_report::changes::Limit;
+use mirrorstats_analysis::changes::Changes;
+use mirrorstats_score::cells::group::DEFAULT_BY;
 use mirrorstats_study::{DiffRequest, Side, diff, resolve};
 
 /// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
@@ -69,7 +68,7 @@ impl DiffArgs {
     }
 
     fn print(&self, changes: &Changes) -> Result<Outcome, Failure> {
-        output::print_rendered(changes, self.json, |changes| changes.render(Limit(self.limit), terminal::width()))?;
+        output::print_rendered(changes, self.json, |changes| changes.render(self.limit, terminal::width()))?;
         let failed = self.fail_on_change && !changes.is_empty();
         Ok(if failed { Outcome::CheckFailed } else { Outcome::Done })
     }

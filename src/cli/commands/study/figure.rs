@@ -6,7 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
-use mirrorstats_report::figures::{FigureFormat, FigureName, FigureWidth};
+use mirrorstats_figures::{FigureFormat, FigureName, FigureWidth};
 use mirrorstats_study::{FigureOptions, MANY_MODELS};
 
 /// Draw one figure.
@@ -28,9 +28,6 @@ pub struct FigureArgs {
     /// The metrics shown, in the order of their roles, such as CAAL [default: those of the style]
     #[arg(long, value_name = "METRIC", value_delimiter = ',')]
     pub metric: Option<Vec<String>>,
-    /// A title above the figure
-    #[arg(long, value_name = "TEXT")]
-    pub title: Option<String>,
     /// The width on paper, such as 8.5cm or 3.3in, with text of at least 6 pt [default: the drawn width]
     #[arg(long, value_name = "WIDTH")]
     pub width: Option<FigureWidth>,
@@ -57,9 +54,9 @@ impl FigureArgs {
         if let Some(path) = &self.output {
             output::check_target(path, study.files_read(Some(&self.style)))?;
         }
-        let Self { style, metric: metrics, title, width, top, .. } = self;
+        let Self { style, metric: metrics, width, top, .. } = self;
         let top = top.map(usize::from);
-        let figure = study.figure(self.name, &FigureOptions { style, metrics, title, width, top })?;
+        let figure = study.figure(self.name, &FigureOptions { style, metrics, width, top })?;
         if top.is_none() && figure.models() > MANY_MODELS {
             output::say(&format!("note: {} models in one figure; --top 12 draws the best 12", figure.models()));
         }
@@ -75,7 +72,7 @@ impl FigureArgs {
             (Some(format), _) => Ok(format),
             (None, Some(path)) => {
                 let hint = |error| Failure::input(format!("{error}; say which one with --format"));
-                FigureFormat::of(path).map_err(hint)
+                FigureFormat::from_path(path).map_err(hint)
             }
             (None, None) => Ok(FigureFormat::Svg),
         }

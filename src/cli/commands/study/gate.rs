@@ -4,7 +4,7 @@ use std::ffi::OsString;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs, TraceArgs, number};
 use crate::cli::{Failure, Outcome, output, terminal};
-use mirrorstats_report::gate::{GateFormat, GateOptions, GateVerdict};
+use mirrorstats_analysis::gate::{GateFormat, GateOptions, GateVerdict};
 
 /// Compare new episodes with old ones: improved, held, regressed, cannot say
 ///

@@ -9,11 +9,11 @@ use crate::cli::commands::world::configured;
 #[cfg(feature = "sim")]
 use crate::cli::registration;
 use crate::cli::{Failure, Outcome, output, terminal};
+use mirrorstats_analysis::plan::register::{NamedHash, RegisteredPlan};
+use mirrorstats_analysis::plan::{Given, Plan, PlanRequest, plan};
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_exact::suggest::hint;
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
-use mirrorstats_report::plan::{Given, Plan, PlanRequest, plan};
 use mirrorstats_score::vocabulary::schema_columns;
 use mirrorstats_statistics::sample_size::Clusters;
 use mirrorstats_study::StudyError;

@@ -72,8 +72,8 @@ mod rows {
     use mirrorstats_engines::polars::shared_file::{WriteError, write_file};
     use mirrorstats_engines::polars::statement;
     use mirrorstats_exact::replace::is_stream;
-    use mirrorstats_report::tables::Table as Printed;
     use mirrorstats_study::StudyError;
+    use mirrorstats_tables::Table as Printed;
 
     const NULL: &str = "NULL";
 

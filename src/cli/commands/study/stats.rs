@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs, number};
 use crate::cli::scoring::with_plan;
 use crate::cli::{Failure, Outcome, output, terminal};
+use mirrorstats_analysis::statistics::text::Length;
+use mirrorstats_analysis::statistics::{Options, Sequential, Statistics};
 use mirrorstats_exact::suggest::hint;
-use mirrorstats_report::statistics::text::Length;
-use mirrorstats_report::statistics::{Options, Sequential, Statistics};
 
 const ALL: &str = "all";
 
@@ -30,14 +30,11 @@ pub struct StatsArgs {
     /// Metrics to print tables for, or `all` [default: those with a chance level, and time to decision]
     #[arg(long = "metric", value_name = "NAME")]
     pub metrics: Vec<String>,
-    /// Horizon of restricted means, in steps [default: the last step known for every model of an experiment]
-    #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(i64).range(1..))]
-    pub horizon: Option<i64>,
     /// Print every interval, plain means, clusters, and the differences that the data could have shown
     #[arg(long)]
     pub full: bool,
     /// Intervals and tests of rates that stay valid if you look after every episode of a running study
-    #[arg(long, conflicts_with_all = ["by", "horizon", "full"])]
+    #[arg(long, conflicts_with_all = ["by", "full"])]
     pub sequential: bool,
     /// A registered plan: each departure of the analysis from it is listed
     #[arg(long, value_name = "FILE")]
@@ -52,8 +49,8 @@ impl StatsArgs {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let study = with_plan(self.traces.study(&scoring, &self.grouping)?, self.plan.as_deref())?;
-        let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
-        let options = Options { confidence, horizon, improvements, ..Options::default() };
+        let (confidence, improvements) = (self.confidence, self.full || self.json);
+        let options = Options { confidence, improvements, ..Options::default() };
         if self.sequential {
             self.print_sequential(&study.sequential(&options)?)
         } else {

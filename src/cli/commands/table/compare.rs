@@ -1,13 +1,9 @@
 //! `compare`: the tables of traces beside the published ones.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
-use mirrorstats_report::errata::{Errata, ErrataError};
-
-/// The style that printed the published tables.
-const PAPER_STYLE: &str = "paper";
 
 /// Compare the tables of traces with published ones, cell by cell.
 #[derive(Clone, Debug, clap::Args)]
@@ -21,14 +17,8 @@ pub struct CompareArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub definitions: Option<PathBuf>,
     /// The style that prints the tables: `paper` or a style file
-    #[arg(long, value_name = "STYLE", default_value = PAPER_STYLE)]
+    #[arg(long, value_name = "STYLE", default_value = "paper")]
     pub style: PathBuf,
-    /// The table to compare [default: the first that has all the published metrics]
-    #[arg(long, value_name = "NAME")]
-    pub table: Option<String>,
-    /// Differences that are slips of the publication [default: those of the paper, with its style]
-    #[arg(long, value_name = "FILE")]
-    pub errata: Option<PathBuf>,
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -40,22 +30,10 @@ pub struct CompareArgs {
 impl CompareArgs {
     /// Scores the traces and compares; the check passes if every difference is excused.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let errata = self.errata()?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
         let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let comparison = study.compare(&self.published, &self.style, self.table.as_deref(), &errata)?;
+        let comparison = study.compare(&self.published, &self.style)?;
         output::print_rendered(&comparison, self.json, |found| found.render(terminal::width()))?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
-    }
-
-    fn errata(&self) -> Result<Errata, Failure> {
-        match &self.errata {
-            Some(path) => Errata::read(path).map_err(|error| match error {
-                ErrataError::Faults(faults) => Failure::Faults(faults),
-                error @ ErrataError::Unreadable { .. } => Failure::input(error),
-            }),
-            None if self.style == Path::new(PAPER_STYLE) => Ok(Errata::of_paper()),
-            None => Ok(Errata::default()),
-        }
     }
 }

@@ -9,14 +9,13 @@ use serde::Serialize;
 use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_agents::reparse::{Diverged, ReparseAnswer};
+use mirrorstats_analysis::changes::Changes;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace::{Content, TemporaryFolder, folder_of};
 use mirrorstats_report::bundle::Manifest;
-use mirrorstats_report::cells::diff::Changes;
-use mirrorstats_report::changes::Limit;
-use mirrorstats_report::tables::Table;
 use mirrorstats_study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored, traces_of};
+use mirrorstats_tables::Table;
 use mirrorstats_trace::inputs::Input;
 
 /// Make a report again from the traces that it was made of, under other definitions or with replies read again
@@ -125,7 +124,7 @@ impl RescoreArgs {
             tell_reparsed(&mut io::stdout().lock(), reparsed, self.limit)?;
         }
         if let Some(changes) = &changes {
-            io::stdout().lock().write_all(changes.render(Limit(self.limit), terminal::width()).as_bytes())?;
+            io::stdout().lock().write_all(changes.render(self.limit, terminal::width()).as_bytes())?;
         }
         output::say(&format!("{}; the report is in {out}", counted(episodes as u64, "episode")));
         Ok(Outcome::Done)

@@ -3,8 +3,8 @@
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::format::{counted, fixed};
-use mirrorstats_report::tables::Table;
 use mirrorstats_study::{LabelAgreement, PairAgreement};
+use mirrorstats_tables::Table;
 
 const CONFIDENCE: f64 = 0.95;
 

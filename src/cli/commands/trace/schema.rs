@@ -10,7 +10,8 @@ use crate::cli::{Failure, Outcome, terminal};
 use mirrorstats_agents::reply;
 use mirrorstats_experiment::schema::ExperimentFile;
 use mirrorstats_experiment::{Experiment, Spec};
-use mirrorstats_report::tables::Table;
+use mirrorstats_import;
+use mirrorstats_tables::Table;
 use mirrorstats_trace::schema::Column;
 use mirrorstats_trace::schema::describe::SchemaDocument;
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use resvg::tiny_skia::{Pixmap, PremultipliedColorU8, Transform};
 
 use crate::cli::Failure;
-use mirrorstats_report::figures::kit::convert;
+use mirrorstats_figures::kit::convert;
 use mirrorstats_sim::contact_sheet::SheetPicture;
 use mirrorstats_trace::episodes::frame::Frame;
 

@@ -5,9 +5,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
+use mirrorstats_figures::film_strip::{Still, film_strip};
+use mirrorstats_figures::{Figure, FigureFormat};
 use mirrorstats_record::replay::filmstrip::{PngFrame, Reel, Strip};
-use mirrorstats_report::figures::film_strip::{Still, film_strip};
-use mirrorstats_report::figures::{Figure, FigureFormat};
 use mirrorstats_trace::episodes::episode::{Action, Step};
 use mirrorstats_trace::episodes::moments::moments;
 use mirrorstats_trace::inputs;
@@ -45,7 +45,7 @@ impl FilmstripArgs {
             return Err(Failure::input("--out: expected a file that ends in .png, .svg or .pdf"));
         }
         let missing = format!("this build writes no .{ending}; build it with the feature `raster`");
-        FigureFormat::of(&self.out).map_err(|_| Failure::input(missing))
+        FigureFormat::from_path(&self.out).map_err(|_| Failure::input(missing))
     }
 
     fn figure(&self) -> Result<Figure, Failure> {

@@ -9,7 +9,6 @@ use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace::{self, is_same_file};
 use mirrorstats_log::read::{episode_hashes, other_episode};
-use mirrorstats_record::replay::again::MOST_RAYS;
 use mirrorstats_record::replay::error::{Divergence, ReplayError};
 use mirrorstats_record::replay::verify::{FramesAnswer, Outputs, RecordedTrace, ReplayAnswer, frame_path};
 use mirrorstats_trace::footers::renderer::Renderer;

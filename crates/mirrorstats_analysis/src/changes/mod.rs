@@ -1,0 +1,381 @@
+//! Compares two scorings: the cells that moved, the episodes that flipped.
+//!
+//! Rule: integers are compared, never floats. Episodes match if their whole keys are equal. Metrics, episodes and cells
+//! of only one scoring are reported, and are never taken as zero.
+
+mod text;
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::{Catalog, Kind};
+use mirrorstats_score::cells::group::{GroupError, group};
+use mirrorstats_score::cells::{Cells, Group, KeyValue};
+use mirrorstats_score::evidence::Evidence;
+use mirrorstats_score::tables::table::{EpisodeKey, EpisodeKeys, EpisodeTable, KeyRef, MetricColumn};
+
+/// A value of the scoring before, and the one after.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Pair<T> {
+    /// Under the old definitions, or in the old scores.
+    pub before: T,
+    /// Under the new ones.
+    pub after: T,
+}
+
+/// Changes from one scoring to another.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Changes {
+    /// The definitions of each side.
+    pub definitions: Pair<DefinitionsName>,
+    /// Expressions that are written differently, those that only one side has included.
+    pub rewritten: Vec<Rewritten>,
+    /// The metrics of each side.
+    pub metrics: Overlap<String>,
+    /// The episodes of each side.
+    pub episodes: Overlap<EpisodeName>,
+    /// The columns that the cells are grouped by.
+    pub by: Vec<String>,
+    /// The number of compared cells.
+    pub cells_compared: u64,
+    /// The cells that moved, in the order of the tables.
+    pub cells: Vec<CellChange>,
+    /// The values that changed, by metric in the order of the tables, then by episode.
+    pub flips: Vec<Flip>,
+}
+
+/// The definitions behind some scores.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct DefinitionsName {
+    /// The file's own name; never a path.
+    pub name: String,
+    /// SHA-256 of the resolved definitions.
+    pub sha256: String,
+}
+
+/// A part of a definition that is not written the same on both sides.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Rewritten {
+    /// The `let` or the metric.
+    pub name: String,
+    /// `let`, `value`, `when`, or `se`.
+    pub part: &'static str,
+    /// The text of the definition; null on a side without one.
+    pub text: Pair<Option<String>>,
+}
+
+/// Items of both sides, and items of one side only.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Overlap<T> {
+    /// The number of items of both sides.
+    pub both: u64,
+    /// The items of the old scoring only.
+    pub(crate) only_before: Vec<T>,
+    /// The items of the new scoring only.
+    pub(crate) only_after: Vec<T>,
+}
+
+/// The name of an episode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct EpisodeName {
+    /// Unique in a report.
+    pub episode_id: String,
+    /// Its model.
+    pub model: String,
+    /// Its experiment.
+    pub experiment: String,
+    /// Its seed.
+    pub seed: i32,
+    /// Its run within the seed.
+    pub run: i32,
+}
+
+/// A cell whose moments are not the same on both sides.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct CellChange {
+    /// The group, by the columns grouped by.
+    pub key: IndexMap<String, KeyValue>,
+    /// The metric.
+    pub metric: String,
+    /// A rate or a quantity, as the new definitions have it.
+    pub kind: Kind,
+    /// Its numbers; null where a side has no episode of the group.
+    pub numbers: Pair<Option<Numbers>>,
+    /// The mean after minus the mean before; null where either is undefined.
+    pub mean_change: Option<f64>,
+}
+
+/// The exact numbers of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Numbers {
+    /// The episodes of the group.
+    pub episodes: u64,
+    /// Those in which the metric is defined: the denominator.
+    pub n: u64,
+    /// The sum of the values; for a rate, the successes.
+    pub sum: i128,
+    /// The sum of their squares.
+    pub sum_sq: i128,
+    /// `sum / n`; null for no value.
+    pub mean: Option<f64>,
+    /// The standard error that the definition asks for; null where it is undefined.
+    pub se: Option<f64>,
+}
+
+/// A value of one episode that changed.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Flip {
+    /// The metric.
+    pub metric: String,
+    /// The episode.
+    #[serde(flatten)]
+    pub episode: EpisodeName,
+    /// The old and the new value; null where the metric is undefined.
+    pub value: Pair<Option<i64>>,
+    /// The timesteps that decided it, ascending; null where the traces that say so were not given.
+    pub timesteps: Pair<Option<Vec<i64>>>,
+}
+
+impl Changes {
+    /// Compares two episode tables; cells are grouped by `by`.
+    ///
+    /// # Errors
+    /// Columns to group by that a table lacks; sums beyond 128 bits.
+    pub fn between(before: &EpisodeTable, after: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
+        let metrics = Overlap::of(&names(before), &names(after));
+        let (cells_compared, cells) = cell_changes(&group(before, by)?, &group(after, by)?);
+        let aligned = Aligned::of(&before.keys, &after.keys);
+        Ok(Self {
+            definitions: Pair { before: origin(&before.catalog), after: origin(&after.catalog) },
+            rewritten: rewritten(before, after),
+            metrics,
+            episodes: aligned.overlap(before, after),
+            by: by.to_vec(),
+            cells_compared,
+            cells,
+            flips: flips(before, after, &aligned.both),
+        })
+    }
+
+    /// Returns true if all numbers are equal, for the same metrics and episodes.
+    pub fn is_empty(&self) -> bool {
+        let same = |only: [usize; 2]| only == [0, 0];
+        self.cells.is_empty()
+            && self.flips.is_empty()
+            && same([self.metrics.only_before.len(), self.metrics.only_after.len()])
+            && same([self.episodes.only_before.len(), self.episodes.only_after.len()])
+    }
+
+    /// The episodes that flipped in any metric.
+    pub fn flipped_episodes(&self) -> BTreeSet<String> {
+        self.flips.iter().map(|flip| flip.episode.episode_id.clone()).collect()
+    }
+
+    /// The metrics in which any episode flipped.
+    pub fn flipped_metrics(&self) -> Vec<String> {
+        let names: BTreeSet<&String> = self.flips.iter().map(|flip| &flip.metric).collect();
+        names.into_iter().cloned().collect()
+    }
+
+    /// Adds the timesteps that decided the old values; ignores evidence for values other than the scores'.
+    pub fn explain_before(&mut self, evidence: &BTreeMap<String, Evidence>) {
+        for flip in &mut self.flips {
+            flip.timesteps.before = deciding(flip, flip.value.before, evidence);
+        }
+    }
+
+    /// Adds the timesteps that decided the new values, as [`Changes::explain_before`].
+    pub fn explain_after(&mut self, evidence: &BTreeMap<String, Evidence>) {
+        for flip in &mut self.flips {
+            flip.timesteps.after = deciding(flip, flip.value.after, evidence);
+        }
+    }
+}
+
+/// The rows of two tables by their keys; both are in key order.
+#[derive(Default)]
+struct Aligned {
+    both: Vec<Pair<usize>>,
+    only_before: Vec<usize>,
+    only_after: Vec<usize>,
+}
+
+impl Aligned {
+    fn of(before: &EpisodeKeys, after: &EpisodeKeys) -> Self {
+        let mut aligned = Self::default();
+        if before.has_keys_of(after) {
+            // One scan scored both, so keys need not be read. Comparing them takes a third of a diff.
+            aligned.both.extend((0..before.len()).map(|row| Pair { before: row, after: row }));
+            return aligned;
+        }
+        let (mut old, mut new) = (0, 0);
+        while old < before.len() && new < after.len() {
+            let order = before.get(old).cmp(&after.get(new));
+            match order {
+                Ordering::Less => aligned.only_before.push(old),
+                Ordering::Greater => aligned.only_after.push(new),
+                Ordering::Equal => aligned.both.push(Pair { before: old, after: new }),
+            }
+            old += usize::from(order.is_le());
+            new += usize::from(order.is_ge());
+        }
+        aligned.only_before.extend(old..before.len());
+        aligned.only_after.extend(new..after.len());
+        aligned
+    }
+
+    fn overlap(&self, before: &EpisodeTable, after: &EpisodeTable) -> Overlap<EpisodeName> {
+        let names = |rows: &[usize], table: &EpisodeTable| -> Vec<EpisodeName> {
+            rows.iter().map(|row| EpisodeName::from(table.keys.get(*row))).collect()
+        };
+        Overlap {
+            both: self.both.len() as u64,
+            only_before: names(&self.only_before, before),
+            only_after: names(&self.only_after, after),
+        }
+    }
+}
+
+impl CellChange {
+    fn new(cells: &Cells, key: &[KeyValue], metric: &str, numbers: Pair<Option<Numbers>>) -> Self {
+        let kind = cells.catalog.metric.get(metric).map_or(Kind::Quantity, |metric| metric.kind);
+        let key = cells.by.iter().cloned().zip(key.iter().cloned()).collect();
+        let mut change = Self { key, metric: metric.to_owned(), kind, numbers, mean_change: None };
+        change.mean_change = change.exact_mean_change().map(as_float);
+        change
+    }
+
+    /// The mean after minus the mean before, as an exact fraction; `None` if either is undefined, or beyond 128 bits.
+    pub(crate) fn exact_mean_change(&self) -> Option<(i128, i128)> {
+        let (before, after) = (self.numbers.before?, self.numbers.after?);
+        let below = i128::from(before.n).checked_mul(i128::from(after.n)).filter(|below| *below > 0)?;
+        let scaled = |sum: i128, n: u64| sum.checked_mul(i128::from(n));
+        let above = scaled(after.sum, before.n)?.checked_sub(scaled(before.sum, after.n)?)?;
+        Some((above, below))
+    }
+}
+
+impl From<KeyRef<'_>> for EpisodeName {
+    fn from(key: KeyRef<'_>) -> Self {
+        let EpisodeKey { experiment, model, seed, run, episode_id } = key.to_owned();
+        Self { episode_id, model, experiment, seed, run }
+    }
+}
+
+fn origin(catalog: &Catalog) -> DefinitionsName {
+    DefinitionsName { name: catalog.name.clone(), sha256: catalog.hash.clone() }
+}
+
+fn names(table: &EpisodeTable) -> Vec<String> {
+    table.metrics.iter().map(|metric| metric.name.clone()).collect()
+}
+
+impl Overlap<String> {
+    pub fn of(before: &[String], after: &[String]) -> Self {
+        let without = |names: &[String], others: &[String]| -> Vec<String> {
+            names.iter().filter(|name| !others.contains(name)).cloned().collect()
+        };
+        let only_after = without(after, before);
+        Self { both: (after.len() - only_after.len()) as u64, only_before: without(before, after), only_after }
+    }
+}
+
+fn rewritten(before: &EpisodeTable, after: &EpisodeTable) -> Vec<Rewritten> {
+    let mut found = Vec::new();
+    let mut push = |name: &str, part, before: Option<String>, after: Option<String>| {
+        if before != after {
+            found.push(Rewritten { name: name.to_owned(), part, text: Pair { before, after } });
+        }
+    };
+    let (old, new) = (&before.catalog, &after.catalog);
+    let mut lets: Vec<&String> = new.lets.keys().collect();
+    lets.extend(old.lets.keys().filter(|name| !new.lets.contains_key(*name)));
+    for name in lets {
+        push(name, "let", old.lets.get(name).cloned(), new.lets.get(name).cloned());
+    }
+    for name in names(after) {
+        if let (Some(old), Some(new)) = (old.metric.get(&name), new.metric.get(&name)) {
+            push(&name, "value", Some(old.value.clone()), Some(new.value.clone()));
+            push(&name, "when", old.when.clone(), new.when.clone());
+            push(&name, "se", Some(old.se.name().to_owned()), Some(new.se.name().to_owned()));
+        }
+    }
+    found
+}
+
+fn flips(before: &EpisodeTable, after: &EpisodeTable, both: &[Pair<usize>]) -> Vec<Flip> {
+    let mut found = Vec::new();
+    let in_place = both.iter().all(|rows| rows.before == rows.after);
+    for new in &after.metrics {
+        let may_flip = |old: &&MetricColumn| !(in_place && old.has_values_of(new));
+        let Some(old) = before.metric(&new.name).filter(may_flip) else { continue };
+        for rows in both {
+            let value = Pair { before: old.get(rows.before), after: new.get(rows.after) };
+            if value.before != value.after {
+                let (metric, episode) = (new.name.clone(), EpisodeName::from(after.keys.get(rows.after)));
+                found.push(Flip { metric, episode, value, timesteps: Pair { before: None, after: None } });
+            }
+        }
+    }
+    found
+}
+
+fn deciding(flip: &Flip, value: Option<i64>, evidence: &BTreeMap<String, Evidence>) -> Option<Vec<i64>> {
+    let metrics = &evidence.get(&flip.episode.episode_id)?.metrics;
+    let found = metrics.iter().find(|metric| metric.metric == flip.metric && metric.value == value)?;
+    Some(found.timesteps.clone())
+}
+
+fn cell_changes(before: &Cells, after: &Cells) -> (u64, Vec<CellChange>) {
+    let old: BTreeMap<&Vec<KeyValue>, &Group> = before.groups.iter().map(|group| (&group.key, group)).collect();
+    let new: BTreeMap<&Vec<KeyValue>, &Group> = after.groups.iter().map(|group| (&group.key, group)).collect();
+    let keys: BTreeSet<&Vec<KeyValue>> = old.keys().chain(new.keys()).copied().collect();
+    let (mut compared, mut moved) = (0, Vec::new());
+    for key in keys {
+        for metric in after.metrics.iter().filter(|metric| before.metrics.contains(metric)) {
+            let numbers = Pair {
+                before: old.get(key).map(|group| Numbers::of(before, group, metric)),
+                after: new.get(key).map(|group| Numbers::of(after, group, metric)),
+            };
+            compared += 1;
+            if !is_same(numbers.before, numbers.after) {
+                moved.push(CellChange::new(after, key, metric, numbers));
+            }
+        }
+    }
+    (compared, moved)
+}
+
+fn is_same(before: Option<Numbers>, after: Option<Numbers>) -> bool {
+    let exact = |numbers: Numbers| (numbers.n, numbers.sum, numbers.sum_sq, numbers.se.map(f64::to_bits));
+    before.map(exact) == after.map(exact)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "the one conversion from integers, done once")]
+fn as_float((above, below): (i128, i128)) -> f64 {
+    above as f64 / below as f64
+}
+
+impl Numbers {
+    fn of(cells: &Cells, group: &Group, metric: &str) -> Self {
+        let place = cells.metrics.iter().position(|known| known == metric);
+        let moments = place.map_or_else(Moments::default, |place| group.moments[place]);
+        let form = cells.catalog.metric.get(metric).map(|metric| metric.se).unwrap_or_default();
+        Self {
+            episodes: group.episodes,
+            n: moments.n,
+            sum: moments.sum,
+            sum_sq: moments.sum_sq,
+            mean: moments.mean(),
+            se: moments.se(form),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

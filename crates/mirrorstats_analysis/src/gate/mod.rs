@@ -1,0 +1,349 @@
+//! Compares later episodes with earlier ones, cell by cell: improved, held, regressed, or why there is no verdict.
+//!
+//! Rule: a loss within the margin is accepted, so `held` comes before `regressed`. Every verdict is Holm-adjusted over
+//! the cells, based on the unit of analysis, and valid for every outcome of the lost episodes.
+
+#![expect(clippy::cast_precision_loss, reason = "counts of tests are far below 2^53")]
+
+mod sides;
+mod text;
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use sides::{FlippedPair, Played};
+pub use text::GateFormat;
+
+use self::sides::{GateSides, LossFill, joined};
+use crate::comparable::Varied;
+use crate::statistics::Replies;
+use crate::statistics::comparisons::compare::{Compared, Comparison};
+use crate::statistics::comparisons::matching::{Matched, Scenes, Units};
+use crate::study::{Block, Study};
+use mirrorstats_exact::format::{fixed, p_value};
+use mirrorstats_exact::moments::{MomentOverflow, Moments};
+use mirrorstats_metric::catalogs::catalog::{Better, Kind};
+use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
+use mirrorstats_statistics::comparisons::holm::{holm, level};
+use mirrorstats_statistics::comparisons::margin;
+use mirrorstats_statistics::design::Design;
+use mirrorstats_statistics::intervals::interval::Interval;
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct GateOptions {
+    /// The metric, which both sides need, with a better direction.
+    pub metric: String,
+    /// The largest accepted loss, in the unit of the metric.
+    pub margin: f64,
+    /// One minus the level of every verdict.
+    pub confidence: f64,
+    /// True to ignore differing settings.
+    pub pool: bool,
+}
+
+/// The verdict on the later episodes of a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GateVerdict {
+    /// Shown to be better.
+    Improved,
+    /// Shown not to be worse by the margin or more.
+    Held,
+    /// None of the others is shown.
+    CannotSay,
+    /// Recorded differently, or on one side alone.
+    #[default]
+    NotComparable,
+    /// Shown to be worse, and not shown to be within the margin.
+    Regressed,
+}
+
+/// All cells of two sets of episodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Gate {
+    /// The metric.
+    pub metric: String,
+    /// The largest loss that is accepted, in the unit of the metric.
+    pub margin: f64,
+    /// One minus the level of every verdict.
+    pub confidence: f64,
+    /// The gravest verdict: regressed, not comparable, cannot say, held, improved.
+    pub verdict: GateVerdict,
+    /// Settings that differ and were declared not to matter, the filter, and replies without a decision: a sentence each.
+    pub caveats: Vec<String>,
+    /// The cells, in the order of the experiments, then by model and condition.
+    pub cells: Vec<GateCell>,
+}
+
+/// One experiment and model, later against earlier.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct GateCell {
+    /// The experiment.
+    pub experiment: String,
+    /// The model, by its later name.
+    pub model: String,
+    /// Its earlier name, where that is another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_model: Option<String>,
+    /// The condition, where it is not the default one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The verdict.
+    pub verdict: GateVerdict,
+    /// The reason for the verdict, or the obstacle.
+    pub why: String,
+    /// The earlier episodes.
+    pub base: GateSide,
+    /// The later episodes.
+    pub new: GateSide,
+    /// The later mean minus the earlier one, over the episodes compared.
+    pub difference: Option<f64>,
+    /// Its interval, not adjusted.
+    pub interval: Option<Interval>,
+    /// The two-sided p value of the difference, adjusted by Holm's method over the cells; null for quantities.
+    pub p_adjusted: Option<f64>,
+    /// The one-sided p value of a loss of the margin or more, adjusted likewise; null for quantities.
+    pub(crate) p_held: Option<f64>,
+    /// The units of analysis where some have several episodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// The units on each side with which a verdict would be likely, if the rates stay unchanged; null with a verdict.
+    pub settled_by: Option<u64>,
+    /// The scenes in which the value changed.
+    pub flips: Vec<FlippedPair>,
+}
+
+/// The episodes of one side of a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct GateSide {
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+    /// The successes among them; null for quantities.
+    pub successes: Option<u64>,
+    /// The mean.
+    pub mean: Option<f64>,
+    /// The episodes that were lost, which are not counted.
+    pub lost: u64,
+}
+
+struct Tried {
+    comparison: Comparison,
+    spread: Option<margin::Spread>,
+    held: Option<f64>,
+}
+
+impl Gate {
+    /// The verdict on every cell of either side.
+    pub fn between(
+        [base, new]: [&EpisodeTable; 2],
+        design: Design,
+        options: &GateOptions,
+    ) -> Result<Self, MomentOverflow> {
+        let sides = GateSides::of(base, new);
+        let barrier = sides.barrier().filter(|_| !options.pool);
+        let counted = joined(&sides, options, LossFill::Out);
+        let study = Study::from_table(&counted, design, None)?;
+        let mut cells = judged(&study, options, barrier.as_deref());
+        let lost = sides.lost();
+        for cell in &mut cells {
+            cell.base_model = sides.base_model(&cell.model);
+            [cell.base.lost, cell.new.lost] = lost.get(&cell.key()).copied().unwrap_or_default();
+        }
+        if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
+            for fill in [LossFill::Against, LossFill::For] {
+                let filled = joined(&sides, options, fill);
+                let bound = judged(&Study::from_table(&filled, design, None)?, options, barrier.as_deref());
+                let verdicts: BTreeMap<_, _> = bound.iter().map(|cell| (cell.key(), cell.verdict)).collect();
+                for cell in &mut cells {
+                    cell.bounded_by(verdicts.get(&cell.key()).copied(), fill);
+                }
+            }
+        }
+        let verdict = cells.iter().map(|cell| cell.verdict).max().unwrap_or(GateVerdict::CannotSay);
+        let GateOptions { metric, margin, confidence, .. } = options.clone();
+        let mut caveats = Vec::new();
+        for setting in sides.barrier().into_iter().chain(apart(&study)).filter(|_| options.pool) {
+            let sentence = format!("Compared though they differ (--pool): {setting}.");
+            if !caveats.contains(&sentence) {
+                caveats.push(sentence);
+            }
+        }
+        for (side, table) in [("BASE", base), ("NEW", new)] {
+            let replies = Replies::from_table(table).and_then(|replies| replies.sentence());
+            caveats.extend(replies.map(|sentence| format!("{side}: {sentence}")));
+        }
+        Ok(Self { metric, margin, confidence, verdict, caveats, cells })
+    }
+}
+
+fn apart(study: &Study) -> Vec<String> {
+    let couples = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks));
+    couples.filter_map(|[base, new]| study.setting_between(base?, new?, Varied::Model)).collect()
+}
+
+fn judged(study: &Study, options: &GateOptions, barrier: Option<&str>) -> Vec<GateCell> {
+    let Some(column) = study.column(&options.metric) else { return Vec::new() };
+    let couples: Vec<_> = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks)).collect();
+    let setting = |couple: &[Option<&Block>; 2]| match couple {
+        [Some(base), Some(new)] if !options.pool => {
+            barrier.map(str::to_owned).or_else(|| study.setting_between(base, new, Varied::Model))
+        }
+        [Some(_), Some(_)] => None,
+        [None, _] => Some("BASE has no episode".to_owned()),
+        [_, None] => Some("NEW has no episode".to_owned()),
+    };
+    let settings: Vec<Option<String>> = couples.iter().map(setting).collect();
+    let tests = settings.iter().filter(|setting| setting.is_none()).count();
+    let tried = couples.iter().zip(&settings).map(|(&[base, new], setting)| {
+        let blocks = [base?, new?];
+        setting.is_none().then(|| (Tried::of(study, column, blocks, options, tests), blocks))
+    });
+    let tried: Vec<Option<(Tried, [&Block; 2])>> = tried.collect();
+    let adjusted = |of: fn(&Tried) -> Option<f64>| {
+        holm(&tried.iter().flatten().filter_map(|(tried, _)| of(tried)).collect::<Vec<_>>()).into_iter()
+    };
+    let (mut apart, mut held) = (adjusted(|tried| tried.comparison.p), adjusted(|tried| tried.held));
+    let cells = couples.iter().zip(settings).zip(&tried).map(|((couple, setting), tried)| {
+        let cell = GateCell::blank(study, column, *couple, setting);
+        let Some((tried, blocks)) = tried else { return cell };
+        let adjusted = (tried.comparison.p.and_then(|_| apart.next()), tried.held.and_then(|_| held.next()));
+        let cell = GateCell { flips: sides::flips(study, column, *blocks), ..cell };
+        cell.decided(tried, adjusted, tests, options, (study, blocks[1]))
+    });
+    cells.collect()
+}
+
+impl Tried {
+    fn of(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2], options: &GateOptions, tests: usize) -> Self {
+        let is_rate = study.kind(&column.name) == Kind::Rate;
+        let matched = Matched::of(&Scenes::of(study, new), &Scenes::of(study, base));
+        let at = |confidence| {
+            Compared { study, first: new, second: base, matched: &matched, horizon: None, confidence }.under(column)
+        };
+        if is_rate {
+            let units = units(study, column, [base, new]);
+            let held = units.non_inferior(options.margin);
+            return Self { comparison: at(options.confidence), spread: units.spread(), held };
+        }
+        // Verdicts on a quantity use its interval, at the Bonferroni level.
+        let share = (1.0 - options.confidence) / tests.max(1) as f64;
+        let (told_apart, within) = (at(1.0 - share), at(1.0 - 2.0 * share));
+        let is_lower = study.better(&column.name) == Better::Lower;
+        let bound = |interval: Interval| if is_lower { -interval.high } else { interval.low };
+        let is_apart = told_apart.interval.is_some_and(|interval| interval.low > 0.0 || interval.high < 0.0);
+        let is_within = within.interval.is_some_and(|interval| bound(interval) > -options.margin);
+        let shown = |is_shown: bool| if is_shown { 0.0 } else { 1.0 };
+        let comparison = Comparison { p: Some(shown(is_apart)), ..at(options.confidence) };
+        let units = comparison.n[0].min(comparison.n[1]);
+        let spread = comparison.difference.zip(comparison.interval).map(|(difference, interval)| {
+            let gain = if is_lower { -difference } else { difference };
+            margin::Spread::of_interval(gain, interval, options.confidence, units)
+        });
+        Self { comparison, spread, held: Some(shown(is_within)) }
+    }
+}
+
+/// The means of both sides by unit; higher is better.
+fn units(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> margin::Units {
+    let is_lower = study.better(&column.name) == Better::Lower;
+    let mean = |mean: f64| if is_lower { 1.0 - mean } else { mean };
+    let (mut old, mut found) = (study.by_unit(base, |row| column.get(row)), margin::Units::default());
+    for (unit, moments) in study.by_unit(new, |row| column.get(row)) {
+        let Some(first) = moments.mean().map(mean) else { continue };
+        match old.remove(&unit).and_then(Moments::mean).map(mean) {
+            Some(second) => found.shared.push((first, second)),
+            None => found.first.push(first),
+        }
+    }
+    found.second.extend(old.into_values().filter_map(Moments::mean).map(mean));
+    found
+}
+
+impl GateCell {
+    fn blank(study: &Study, column: &MetricColumn, [base, new]: [Option<&Block>; 2], setting: Option<String>) -> Self {
+        let (model, experiment) = new.or(base).map_or(("", ""), |block| (block.model, block.experiment));
+        let side = |block: Option<&Block>| {
+            let moments = block.map(|block| block.moments(column)).unwrap_or_default();
+            let successes = moments.counts().filter(|_| study.kind(&column.name) == Kind::Rate);
+            GateSide { n: moments.n, successes: successes.map(|counts| counts.0), mean: moments.mean(), lost: 0 }
+        };
+        Self {
+            experiment: experiment.to_owned(),
+            model: model.to_owned(),
+            condition: new.or(base).and_then(sides::condition),
+            why: setting.unwrap_or_default(),
+            base: side(base),
+            new: side(new),
+            ..Self::default()
+        }
+    }
+
+    fn decided(
+        self,
+        tried: &Tried,
+        (p_adjusted, p_held): (Option<f64>, Option<f64>),
+        tests: usize,
+        options: &GateOptions,
+        (study, block): (&Study, &Block),
+    ) -> Self {
+        let Comparison { difference, interval, units, .. } = tried.comparison.clone();
+        let alpha = level(options.confidence).unwrap_or_default();
+        let sign = if study.better(&options.metric) == Better::Lower { -1.0 } else { 1.0 };
+        let gain = difference.map_or(0.0, |difference| sign * difference);
+        let is_counted = !units.as_ref().is_some_and(|units| units.too_few);
+        let is_apart = is_counted && p_adjusted.is_some_and(|p| p <= alpha);
+        let is_rate = study.kind(&options.metric) == Kind::Rate;
+        let numbers = |p: Option<f64>| if is_rate { format!(", p {}", p_value(p)) } else { String::new() };
+        let (verdict, why) = if is_apart && gain > 0.0 {
+            (GateVerdict::Improved, format!("better by {}{}", fixed(Some(gain), 3), numbers(p_adjusted)))
+        } else if p_held.is_some_and(|p| p <= alpha) {
+            (GateVerdict::Held, format!("not worse by {}{}", options.margin, numbers(p_held)))
+        } else if is_apart && gain < 0.0 {
+            (GateVerdict::Regressed, format!("worse by {}{}", fixed(Some(-gain), 3), numbers(p_adjusted)))
+        } else {
+            (GateVerdict::CannotSay, String::new())
+        };
+        let settled_by = (verdict == GateVerdict::CannotSay)
+            .then(|| tried.spread?.settling(options.margin, alpha / tests.max(1) as f64))
+            .flatten();
+        let name = study.unit_name(block);
+        let why = match (verdict, settled_by) {
+            (GateVerdict::CannotSay, Some(n)) => format!("about {n} {name} on each side would settle it"),
+            (GateVerdict::CannotSay, None) if tried.comparison.interval.is_none() && !is_rate => {
+                "the values have no interval: too few, too alike, or several per scene".to_owned()
+            }
+            (GateVerdict::CannotSay, None) => format!("too few {name} for any verdict"),
+            _ => why,
+        };
+        let shown = |p: Option<f64>| p.filter(|_| is_rate);
+        Self {
+            verdict,
+            why,
+            difference,
+            interval,
+            p_adjusted: shown(p_adjusted),
+            p_held: shown(p_held),
+            units,
+            settled_by,
+            ..self
+        }
+    }
+
+    fn key(&self) -> (&str, &str, &str) {
+        (&self.experiment, &self.model, self.condition.as_deref().unwrap_or(sides::DEFAULT))
+    }
+
+    fn bounded_by(&mut self, bound: Option<GateVerdict>, fill: LossFill) {
+        let has_verdict = !matches!(self.verdict, GateVerdict::CannotSay | GateVerdict::NotComparable);
+        let lost = self.base.lost + self.new.lost;
+        if !has_verdict || lost == 0 || bound == Some(self.verdict) {
+            return;
+        }
+        let (verdict, side) = (text::name(self.verdict), if fill == LossFill::Against { "against" } else { "for" });
+        let other = bound.map_or("nothing", text::name);
+        self.why = format!("{verdict} without the {lost} lost episodes, {other} if they count {side} NEW");
+        self.verdict = GateVerdict::CannotSay;
+    }
+}

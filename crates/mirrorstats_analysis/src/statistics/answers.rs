@@ -1,0 +1,303 @@
+//! The main answers, one line each: models above chance, models that differ, effects of the mirror.
+//!
+//! Rule: an answer states only what a test shows after Holm's adjustment; the numbers are in the tables. Items that do
+//! not fit on a line are counted.
+
+use std::collections::BTreeSet;
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::compare::{Comparison, Sign};
+use super::losses::LOST;
+use super::{ChanceRow, Contrast, Family, Method, Options, Reach, Role, Selection, Statistics, Units, Verdict};
+use mirrorstats_exact::format;
+
+/// The most pairs that an experiment's answer names; others are counted.
+const MOST_NAMED: usize = 6;
+
+const ABOVE_CHANCE: &str = "Who is above chance?";
+
+/// One question about one metric, and its answer over all experiments.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Answer {
+    /// The question.
+    pub question: String,
+    /// The metric that the answer is about.
+    pub metric: String,
+    /// The answer, in a line.
+    pub answer: String,
+    /// True if it is the declared primary one.
+    #[serde(default)]
+    pub role: AnswerRole,
+    /// Filters, pooling and losses behind the answer, a phrase each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub caveats: Vec<String>,
+}
+
+/// The weight of an answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AnswerRole {
+    /// The question that the study was made for; the first answer.
+    Primary,
+    /// Any other question.
+    #[default]
+    Secondary,
+}
+
+impl Answer {
+    fn new(question: &str, metric: &str, parts: &[String]) -> Option<Self> {
+        let (question, metric, answer) = (question.to_owned(), metric.to_owned(), parts.join("; "));
+        (!parts.is_empty()).then(|| Self { question, metric, answer, role: AnswerRole::Secondary, caveats: Vec::new() })
+    }
+}
+
+pub(super) fn answers(statistics: &Statistics, options: &Options) -> (Vec<Answer>, usize) {
+    let mut answers = unranked(statistics);
+    let primary = options.primary.as_ref().or(statistics.headline.first());
+    let first = answers.iter().position(|answer| Some(&answer.metric) == primary).unwrap_or(0);
+    if first < answers.len() {
+        answers[..=first].rotate_right(1);
+        answers[0].role = AnswerRole::Primary;
+    }
+    let caveats = caveats(statistics, options);
+    for answer in &mut answers {
+        answer.caveats.clone_from(&caveats);
+    }
+    let families = families(statistics, &answers);
+    (answers, families)
+}
+
+fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
+    let of_chance = |metric: &str| answers.iter().any(|it| it.metric == metric && it.question == ABOVE_CHANCE);
+    let is_answered = |metric: &String| statistics.headline.contains(metric);
+    let chance = statistics.chance.iter().filter(|row| of_chance(&row.metric));
+    let levels: BTreeSet<_> = chance.map(|row| (&row.key.experiment, &row.metric, row.level.to_string())).collect();
+    let models = statistics.models.iter().filter(|family| is_answered(&family.metric));
+    let models = models.filter(|family| family.comparisons().any(|it| it.p.is_some())).count();
+    let overall = statistics.overall.iter().filter(|row| is_answered(&row.metric) && row.p.is_some());
+    let overall: BTreeSet<_> = overall.map(|row| &row.metric).collect();
+    let tested = statistics.conditions.iter().filter(|it| is_answered(&it.metric) && it.comparison.p.is_some());
+    let conditions: BTreeSet<_> = tested.map(|it| (&it.metric, &it.baseline, &it.against)).collect();
+    levels.len() + models + overall.len() + conditions.len()
+}
+
+fn caveats(statistics: &Statistics, options: &Options) -> Vec<String> {
+    let selection = statistics.selection.as_ref().map(Selection::phrase);
+    let lost = Some(super::warnings::lost(statistics)).filter(|lost| *lost > 0);
+    let lost = lost.map(|lost| format!("{} lost", format::counted(lost, "episode")));
+    let replies = statistics.replies.as_ref().filter(|replies| replies.unusable > 0);
+    let replies =
+        replies.map(|it| format!("{} of {} gave no decision", it.unusable, format::counted(it.replies, "reply")));
+    let pooled = (!statistics.pooled.is_empty()).then(|| "recordings that differ are pooled".to_owned());
+    let given = options.caveats.iter().cloned();
+    selection.into_iter().chain(pooled).chain(given).chain(lost).chain(replies).collect()
+}
+
+fn unranked(statistics: &Statistics) -> Vec<Answer> {
+    let mut answers = Vec::new();
+    let confidence = statistics.confidence;
+    for metric in &statistics.headline {
+        for metric in [metric.as_str()].into_iter().chain(statistics.relations.completed(metric)) {
+            answers.extend(Answer::new(ABOVE_CHANCE, metric, &above(&statistics.chance, metric, confidence)));
+        }
+    }
+    for metric in &statistics.headline {
+        let families = statistics.models.iter().filter(|family| family.metric == *metric);
+        let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
+        let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
+        let is_tested = overall.iter().any(|row| row.p.is_some());
+        // If no experiment could show a difference, a missing difference over all of them is no answer either.
+        let is_unsayable = !overall.iter().any(|row| row.separated)
+            && families.clone().all(|family| unsayable(family, confidence).is_some());
+        let unsettled = overall.iter().filter(|row| row.losses.is_some_and(|losses| !losses.agree));
+        let unsettled: Vec<String> = unsettled.map(|_| LOST.to_owned()).collect();
+        let overall = match (overall.len(), is_tested) {
+            (0, _) => None,
+            (_, false) => Some("over all experiments not tested".to_owned()),
+            _ if is_unsayable => Some("over all experiments cannot say".to_owned()),
+            (all, true) => Some(differing("over all experiments", all, separated) + &unsaid_pairs(&unsettled)),
+        };
+        let parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
+        answers.extend(Answer::new("Who differs from whom?", metric, &parts));
+    }
+    let question =
+        if statistics.is_mirror { "What does the mirror change?" } else { "What does the experiment change?" };
+    for metric in &statistics.headline {
+        let parts = changes(&statistics.conditions, metric, confidence);
+        answers.extend(Answer::new(question, metric, &parts));
+    }
+    answers
+}
+
+fn unsaid_pairs(reasons: &[String]) -> String {
+    let each: BTreeSet<&str> = reasons.iter().map(String::as_str).collect();
+    let each = Vec::from_iter(each).join(" or ");
+    match reasons.len() as u64 {
+        0 => String::new(),
+        count => format!(", cannot say for {}: {each}", format::counted(count, "pair")),
+    }
+}
+
+fn above(rows: &[ChanceRow], metric: &str, confidence: f64) -> Vec<String> {
+    let mut experiments: IndexMap<&str, Vec<&ChanceRow>> = IndexMap::new();
+    for row in rows.iter().filter(|row| row.metric == metric) {
+        experiments.entry(&row.key.experiment).or_default().push(row);
+    }
+    experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows, confidence)).collect()
+}
+
+fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
+    let highest = |a: &&&ChanceRow, b: &&&ChanceRow| a.level.value().total_cmp(&b.level.value());
+    let level =
+        rows.iter().filter(|row| row.role == Role::Chance).max_by(highest).or_else(|| rows.iter().max_by(highest));
+    let level = level.map(|row| (row.role, row.level));
+    let rows: Vec<_> = rows.iter().filter(|row| Some((row.role, row.level)) == level).collect();
+    let those =
+        |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.key.name()).collect::<Vec<_>>();
+    let (above, below) = (those(Verdict::Above), those(Verdict::Below));
+    let unsaid: Vec<(String, Units)> =
+        rows.iter().filter_map(|row| Some((row.key.name(), row.unsaid(confidence)?))).collect();
+    let reference = level.filter(|(role, _)| *role == Role::Reference);
+    let about =
+        reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
+    if let Some((_, units)) = unsaid.iter().max_by_key(|(_, units)| units.n).filter(|_| unsaid.len() == rows.len()) {
+        return format!("{about} {}", cannot_say(units));
+    }
+    let family: Vec<&ChanceRow> = rows.iter().map(|row| **row).collect();
+    if let Some(units) = ChanceRow::hopeless(&family, confidence) {
+        return format!("{about} {} for {}", cannot_say(&units), format::counted(rows.len() as u64, "model"));
+    }
+    let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
+    let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", units.counted()));
+    let verdicts = format!("{about} {}{below}", names(&above, rows.len()));
+    [verdicts].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
+}
+
+fn names(models: &[String], all: usize) -> String {
+    match models.len() {
+        0 => "nobody".to_owned(),
+        count if count == all && count > 1 => format!("all {count}"),
+        _ => models.join(", "),
+    }
+}
+
+/// The answer if no outcome of these units could be significant.
+fn cannot_say(units: &Units) -> String {
+    format!("cannot say: {}", units.counted())
+}
+
+/// The reason why these comparisons cannot show a difference; `None` if any can.
+fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
+    let unsaid = |found: &Comparison| found.unsaid(confidence);
+    let is_tried = |found: &&&Comparison| {
+        found.incomparable.is_none() && (found.p.is_some() || found.units.is_some() || unsaid(found).is_some())
+    };
+    let mut tested = comparisons.iter().filter(is_tried).peekable();
+    if tested.peek().is_none() {
+        return Some(apart(comparisons).unwrap_or_else(|| "not tested".to_owned()));
+    }
+    let too_few = tested.map(|found| unsaid(found)).collect::<Option<Vec<_>>>()?;
+    too_few.iter().max_by_key(|units| units.n).map(cannot_say)
+}
+
+fn apart(comparisons: &[&Comparison]) -> Option<String> {
+    let settings: Vec<&String> = comparisons.iter().filter_map(|found| found.incomparable.as_ref()).collect();
+    let setting = settings.first()?;
+    let (count, all) = (settings.len(), comparisons.len());
+    let count = if count == all { String::new() } else { format!("{count} of {all} ") };
+    Some(format!("{count}not comparable ({setting})"))
+}
+
+/// The reason why no test of a family can show a difference.
+fn unsayable(family: &Family, confidence: f64) -> Option<String> {
+    let comparisons: Vec<&Comparison> = family.comparisons().collect();
+    untested(&comparisons, confidence).or_else(|| match family.detectable {
+        Some(Reach { method, n, tests, family: None, .. }) => {
+            let name = if method == Method::Mcnemar { "pair" } else { "episode" };
+            Some(format!(
+                "cannot say: {} for {}",
+                format::counted(n, name),
+                format::counted(tests as u64, "comparison")
+            ))
+        }
+        _ => None,
+    })
+}
+
+fn differing_in(family: &Family, confidence: f64) -> String {
+    if let Some(why) = unsayable(family, confidence) {
+        return format!("{} {why}", family.experiment);
+    }
+    let comparisons: Vec<&Comparison> = family.comparisons().collect();
+    let separated = family.tests.iter().filter(|test| test.comparison.separated);
+    let is_silent = |it: &&Comparison| !it.separated && it.incomparable.is_none();
+    let reason = |it: &Comparison| match it.unsaid(confidence) {
+        Some(units) if units.name == LOST => Some(units.name),
+        Some(units) => Some(units.counted()),
+        None => it.p.is_none().then(|| "not tested".to_owned()),
+    };
+    let unsaid: Vec<String> = comparisons.iter().copied().filter(is_silent).filter_map(reason).collect();
+    let unsettled = unsaid_pairs(&unsaid);
+    let differing =
+        differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
+    [differing + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
+}
+
+/// The separated pairs, grouped by the better model; `all` is the number of pairs.
+fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n str, &'n str)>) -> String {
+    let separated: Vec<_> = separated.collect();
+    if separated.len() > MOST_NAMED {
+        return format!("{about} {} of {}", separated.len(), format::counted(all as u64, "pair"));
+    }
+    let mut better: IndexMap<&str, Vec<&str>> = IndexMap::new();
+    for (first, second) in separated {
+        better.entry(first).or_default().push(second);
+    }
+    let over = |(first, seconds): (&str, Vec<&str>)| format!("{first} better than {}", seconds.join(", "));
+    let parts: Vec<String> = better.into_iter().map(over).collect();
+    let said = if parts.is_empty() { "nobody".to_owned() } else { parts.join(" and ") };
+    format!("{about} {said}")
+}
+
+fn changes(contrasts: &[Contrast], metric: &str, confidence: f64) -> Vec<String> {
+    let mut groups: IndexMap<(&str, &str), Vec<&Contrast>> = IndexMap::new();
+    for contrast in contrasts.iter().filter(|contrast| contrast.metric == metric) {
+        groups.entry((&contrast.baseline, &contrast.against)).or_default().push(contrast);
+    }
+    groups.into_iter().map(|((baseline, against), group)| changed(baseline, against, &group, confidence)).collect()
+}
+
+fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) -> String {
+    let those = |sign| -> Vec<String> {
+        let found = group.iter().filter(|contrast| contrast.comparison.sign() == sign);
+        found.map(|contrast| contrast.name()).collect()
+    };
+    let phrase = |what: &str, sign| {
+        let models = those(Some(sign));
+        (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
+    };
+    let comparisons: Vec<&Comparison> = group.iter().map(|contrast| &contrast.comparison).collect();
+    if let Some(why) = untested(&comparisons, confidence) {
+        return format!("{baseline} - {against} {why}");
+    }
+    let is_silent = |it: &Comparison| it.sign().is_none() && it.incomparable.is_none();
+    let silent = group.iter().filter(|contrast| is_silent(&contrast.comparison));
+    let (unsaid, shown): (Vec<&&Contrast>, Vec<_>) =
+        silent.partition(|it| it.comparison.p.is_none() || it.comparison.unsaid(confidence).is_some());
+    let unshown = match (shown.len(), group.len()) {
+        (0, _) => None,
+        (rest, all) if rest == all => Some("no change shown".to_owned()),
+        (rest, _) => Some(format!("no change shown for {rest} more")),
+    };
+    let unsaid = unsaid.into_iter().map(|contrast| {
+        let model = contrast.name();
+        let why = contrast.comparison.unsaid(confidence).map_or_else(|| "not tested".to_owned(), |it| it.counted());
+        format!("cannot say for {model}: {why}")
+    });
+    let shown = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown].into_iter().flatten();
+    let parts: Vec<String> = shown.chain(unsaid).chain(apart(&comparisons)).collect();
+    format!("{baseline} - {against} {}", parts.join(", "))
+}

@@ -1,0 +1,119 @@
+//! Contrasts of experiments for each model: those that the definitions declare by `control`, else the first experiment
+//! minus each other one.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::comparable::tasks_differ;
+use crate::statistics::compare::{Compared, Comparison, adjust};
+use crate::statistics::matching::{Matched, Matching, Scenes};
+use crate::study::{Block, Experiment, Study, named};
+use mirrorstats_score::tables::table::MetricColumn;
+
+/// The difference of a model's mean between two experiments, by pairs if their scenes agree.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Contrast {
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric.
+    pub metric: String,
+    /// The experiment that comes first in the definitions.
+    pub baseline: String,
+    /// The experiment subtracted from it.
+    pub against: String,
+    /// The matching of the episodes of the two experiments.
+    pub matching: Matching,
+    /// The baseline minus the other, adjusted over all models under the same metric and experiments.
+    #[serde(flatten)]
+    pub comparison: Comparison,
+}
+
+pub(crate) struct ConditionPair<'s, 'a> {
+    baseline: &'s Experiment<'a>,
+    against: &'s Experiment<'a>,
+    /// The declared metrics; all if empty.
+    on: &'a [String],
+}
+
+impl<'s, 'a> ConditionPair<'s, 'a> {
+    fn all(study: &'s Study<'a>) -> Vec<Self> {
+        let known = &study.table.catalog.experiment;
+        if known.values().any(|experiment| experiment.control.is_some()) {
+            let declared = |against: &'s Experiment<'a>| {
+                let control = known.get(against.name)?.control.as_ref()?;
+                let baseline = study.experiments.iter().find(|experiment| experiment.name == control.of)?;
+                Some(Self { baseline, against, on: &control.on })
+            };
+            return study.experiments.iter().filter_map(declared).collect();
+        }
+        let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
+        others.iter().map(|against| Self { baseline, against, on: &[] }).collect()
+    }
+
+    fn columns(&self, study: &Study<'a>) -> Vec<&'a MetricColumn> {
+        study.table.metrics.iter().filter(|column| self.on.is_empty() || self.on.contains(&column.name)).collect()
+    }
+
+    /// The blocks of one model and condition in both experiments.
+    pub(crate) fn couples(&self) -> impl Iterator<Item = (&'s Block<'a>, &'s Block<'a>)> {
+        let firsts = &self.baseline.blocks;
+        let same = move |second: &'s Block<'a>| {
+            firsts.iter().filter(|first| second.is_same_subject(first)).map(move |first| (first, second))
+        };
+        self.against.blocks.iter().flat_map(same)
+    }
+}
+
+impl Contrast {
+    /// The model, with its condition if there are several.
+    pub(crate) fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+
+    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+        let mut contrasts = Vec::new();
+        for pair in Self::pairs(study) {
+            let (mut family, columns) = (Vec::new(), pair.columns(study));
+            for (first, second) in pair.couples() {
+                let matched = Matched::of(&Scenes::of(study, first), &Scenes::of(study, second));
+                let compared = Compared { study, first, second, matched: &matched, horizon: None, confidence };
+                let incomparable = study.incomparable(first, second);
+                let under = |column: &MetricColumn| Self {
+                    model: first.model.to_owned(),
+                    condition: first.condition(),
+                    metric: column.name.clone(),
+                    baseline: first.experiment.to_owned(),
+                    against: second.experiment.to_owned(),
+                    matching: matched.matching,
+                    comparison: compared.under(column).unless(incomparable.clone()),
+                };
+                family.extend(columns.iter().map(|column| under(column)));
+            }
+            for column in columns {
+                let of_metric = family.iter_mut().filter(|it: &&mut Self| it.metric == column.name);
+                adjust(of_metric.map(|it| &mut it.comparison), confidence);
+            }
+            contrasts.extend(family);
+        }
+        contrasts
+    }
+
+    /// The pairs of experiments with similar tasks.
+    pub(crate) fn pairs<'s, 'a>(study: &'s Study<'a>) -> Vec<ConditionPair<'s, 'a>> {
+        let catalog = &study.table.catalog;
+        let is_like = |pair: &ConditionPair| tasks_differ(catalog, pair.baseline.name, pair.against.name).is_none();
+        ConditionPair::all(study).into_iter().filter(is_like).collect()
+    }
+
+    pub(crate) fn left_out(study: &Study) -> Vec<String> {
+        let sentence = |pair: ConditionPair| {
+            let (baseline, against) = (pair.baseline.name, pair.against.name);
+            let why = tasks_differ(&study.table.catalog, baseline, against)?;
+            Some(format!("{against} is not contrasted with {baseline}: {why}."))
+        };
+        ConditionPair::all(study).into_iter().filter_map(sentence).collect()
+    }
+}

@@ -1,0 +1,296 @@
+//! The episode table by experiment, model and condition: the blocks that every statistic compares.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::comparable::{Recorded, Varied, difference};
+use mirrorstats_exact::moments::{MomentOverflow, Moments};
+use mirrorstats_metric::catalogs::catalog::{Better, Kind, Metric};
+use mirrorstats_metric::catalogs::relations::Relations;
+use mirrorstats_score::cells::interval;
+use mirrorstats_score::tables::lost_counts::LostCounts;
+use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
+use mirrorstats_statistics::design::{Cluster, Design};
+use mirrorstats_statistics::intervals::interval::Interval;
+
+const DEFAULT_CONDITION: &str = "default";
+
+/// The label of the scene: room, body, cubes, start.
+const SCENE: &str = "scene";
+
+const PARTICIPANT: &str = "participant";
+
+/// The unit of analysis: episodes within it depend on each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Unit {
+    Seed(i32),
+    Participant(usize),
+    Scene(usize),
+    Episode(usize),
+}
+
+/// An episode table and its blocks, ordered by the catalog's experiments, then by model and condition.
+pub(crate) struct Study<'a> {
+    pub table: &'a EpisodeTable,
+    pub design: Design,
+    pub experiments: Vec<Experiment<'a>>,
+    pub relations: Relations,
+    /// True to ignore differing settings.
+    pub pool: bool,
+    ranges: BTreeMap<&'a str, Interval>,
+}
+
+/// The experiment, the model and the condition that a row is about.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct RowKey {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+}
+
+impl RowKey {
+    /// The name in comparisons: `model`, or `model [condition]` if there are several.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+}
+
+pub(crate) struct Experiment<'a> {
+    pub name: &'a str,
+    pub blocks: Vec<Block<'a>>,
+}
+
+/// The episodes of one model in one experiment under one condition, and the moments of their metrics.
+pub(crate) struct Block<'a> {
+    pub experiment: &'a str,
+    pub model: &'a str,
+    /// The condition; `None` if all episodes of the table have the default one.
+    pub condition: Option<&'a str>,
+    rows: Vec<Range<usize>>,
+    recorded: Recorded<'a>,
+    moments: BTreeMap<&'a str, Moments>,
+    /// The number of lost episodes, which are not in the rows.
+    pub lost: u64,
+    /// True if any unit has several episodes.
+    pub repeats: bool,
+}
+
+impl<'a> Study<'a> {
+    pub fn from_table(
+        table: &'a EpisodeTable,
+        design: Design,
+        lost: Option<&LostCounts>,
+    ) -> Result<Self, MomentOverflow> {
+        let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
+        let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
+        // A table is ordered by experiment, then by model.
+        for rows in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
+            let key = table.keys.get(rows.start);
+            let of_experiment =
+                blocks.entry((table.catalog.experiment_rank(key.experiment), key.experiment)).or_default();
+            for (condition, rows) in by_condition(conditions, rows) {
+                of_experiment.push(Block::of(table, (key.experiment, key.model, condition), rows)?);
+            }
+        }
+        let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
+        let names = table.metrics.iter().map(|column| column.name.as_str());
+        let ranges = names.zip(interval::ranges(table)).collect();
+        let relations = Relations::of(&table.catalog);
+        let mut study = Self { table, design, experiments, relations, pool: false, ranges };
+        let of_block = |block: &Block| {
+            let lost = lost.map_or(0, |lost| lost.of(block.experiment, block.model, block.condition));
+            (lost, study.has_repeats(block))
+        };
+        let found: Vec<(u64, bool)> = study.blocks().map(of_block).collect();
+        let blocks = study.experiments.iter_mut().flat_map(|experiment| &mut experiment.blocks);
+        blocks.zip(found).for_each(|(block, (lost, repeats))| (block.lost, block.repeats) = (lost, repeats));
+        Ok(study)
+    }
+
+    /// The differing setting of two blocks that the comparison does not vary; `None` if none is known.
+    pub(crate) fn setting_between(&self, first: &Block, second: &Block, varied: Varied) -> Option<String> {
+        difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
+    }
+
+    /// The same for two blocks of one study.
+    pub(crate) fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
+        let varied = if first.experiment != second.experiment {
+            Varied::Experiment
+        } else if first.model == second.model {
+            Varied::Condition
+        } else {
+            Varied::Model
+        };
+        self.setting_between(first, second, varied)
+    }
+
+    /// The same; `None` if differing settings are ignored.
+    pub(crate) fn incomparable(&self, first: &Block, second: &Block) -> Option<String> {
+        if self.pool { None } else { self.setting_apart(first, second) }
+    }
+
+    pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
+        self.experiments.iter().flat_map(|experiment| &experiment.blocks)
+    }
+
+    /// The scene of each row, if equal scenes make pairs.
+    pub fn scenes(&self) -> Option<&'a TextColumn> {
+        self.table.label(SCENE).filter(|_| self.design.has_pairs())
+    }
+
+    /// Returns true if episodes may share a unit: clusters, participants or scenes are declared.
+    pub(crate) fn has_units(&self) -> bool {
+        let labelled = || [SCENE, PARTICIPANT].iter().any(|label| self.table.label(label).is_some());
+        self.design.has_pairs() && (self.design.clusters().is_some() || labelled())
+    }
+
+    /// The unit of a row: the declared cluster, else the participant, else the scene, else the episode itself.
+    pub fn unit(&self, row: usize) -> Unit {
+        if self.design.clusters() == Some(Cluster::Seed) {
+            return Unit::Seed(self.table.keys.seed(row));
+        }
+        let scene = || self.scenes().and_then(|scenes| scenes.code(row)).map(Unit::Scene);
+        self.participant(row).map(Unit::Participant).or_else(scene).unwrap_or(Unit::Episode(row))
+    }
+
+    pub fn participant(&self, row: usize) -> Option<usize> {
+        self.table.label(PARTICIPANT).filter(|_| self.design.has_pairs()).and_then(|label| label.code(row))
+    }
+
+    /// The defined values of each unit of a block.
+    pub(crate) fn by_unit(&self, block: &Block, value: impl Fn(usize) -> Option<i64>) -> BTreeMap<Unit, Moments> {
+        let mut units: BTreeMap<Unit, Moments> = BTreeMap::new();
+        for (row, value) in block.rows().filter_map(|row| Some((row, value(row)?))) {
+            let sum = units.entry(self.unit(row)).or_default();
+            *sum = sum.with(value).expect("a part of a block that was summed whole");
+        }
+        units
+    }
+
+    /// The first defined value of each unit, in the order of the episodes.
+    pub fn firsts(&self, block: &Block, column: &MetricColumn) -> Vec<(Unit, i64)> {
+        let mut seen = BTreeSet::new();
+        let defined = block.rows().filter_map(|row| Some((self.unit(row), column.get(row)?)));
+        defined.filter(|(unit, _)| seen.insert(*unit)).collect()
+    }
+
+    fn has_repeats(&self, block: &Block) -> bool {
+        if !self.has_units() {
+            return false;
+        }
+        let units: BTreeSet<Unit> = block.rows().map(|row| self.unit(row)).collect();
+        units.len() < block.rows().count()
+    }
+
+    /// The name of a block's units, in the plural.
+    pub(crate) fn unit_name(&self, block: &Block) -> &'static str {
+        match block.rows().next().map(|row| self.unit(row)) {
+            Some(Unit::Seed(_)) => "seeds",
+            Some(Unit::Participant(_)) => "participants",
+            Some(Unit::Scene(_)) => "scenes",
+            _ => "episodes",
+        }
+    }
+
+    pub fn column(&self, metric: &str) -> Option<&'a MetricColumn> {
+        self.table.metric(metric)
+    }
+
+    /// The metrics with values 0 and 1.
+    pub fn rates(&self) -> impl Iterator<Item = &'a MetricColumn> {
+        self.table.metrics.iter().filter(|column| self.kind(&column.name) == Kind::Rate)
+    }
+
+    /// The kind of a metric; a metric that the catalog does not describe is not a rate.
+    pub fn kind(&self, metric: &str) -> Kind {
+        self.metric(metric).map_or(Kind::Quantity, |metric| metric.kind)
+    }
+
+    pub fn metric(&self, name: &str) -> Option<&'a Metric> {
+        self.table.catalog.metric.get(name)
+    }
+
+    pub fn better(&self, metric: &str) -> Better {
+        self.metric(metric).map_or(Better::Neither, |metric| metric.better)
+    }
+
+    /// The least and the largest possible mean of a metric.
+    pub fn range(&self, metric: &str) -> Interval {
+        self.ranges.get(metric).copied().unwrap_or(Interval::UNBOUNDED)
+    }
+}
+
+impl<'a> Block<'a> {
+    fn of(
+        table: &'a EpisodeTable,
+        (experiment, model, condition): (&'a str, &'a str, Option<&'a str>),
+        rows: Vec<Range<usize>>,
+    ) -> Result<Self, MomentOverflow> {
+        let of_column = |column: &'a MetricColumn| {
+            let moments =
+                rows.iter().try_fold(Moments::default(), |sum, rows| column.add_moments(sum, rows.clone()))?;
+            Ok((column.name.as_str(), moments))
+        };
+        let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
+        let recorded = Recorded::of(table, rows.iter().cloned().flatten());
+        Ok(Self { experiment, model, condition, rows, recorded, moments, lost: 0, repeats: false })
+    }
+
+    /// The name in comparisons: `model`, or `model [condition]` if there are several.
+    pub fn name(&self) -> String {
+        named(self.model, self.condition)
+    }
+
+    /// Returns true if another block has the same model and condition.
+    pub(crate) fn is_same_subject(&self, other: &Self) -> bool {
+        (self.model, self.condition) == (other.model, other.condition)
+    }
+
+    pub fn key(&self) -> RowKey {
+        RowKey { experiment: self.experiment.to_owned(), model: self.model.to_owned(), condition: self.condition() }
+    }
+
+    pub fn condition(&self) -> Option<String> {
+        self.condition.map(str::to_owned)
+    }
+
+    pub fn rows(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.rows.iter().cloned().flatten()
+    }
+
+    pub fn moments(&self, column: &MetricColumn) -> Moments {
+        self.moments[column.name.as_str()]
+    }
+}
+
+pub(crate) fn named(model: &str, condition: Option<&str>) -> String {
+    condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
+}
+
+/// The rows of one model by condition, which is not part of a table's order.
+fn by_condition(conditions: Option<&TextColumn>, rows: Range<usize>) -> Vec<(Option<&str>, Vec<Range<usize>>)> {
+    let Some(conditions) = conditions else { return vec![(None, vec![rows])] };
+    let mut parts: BTreeMap<&str, Vec<Range<usize>>> = BTreeMap::new();
+    for run in runs(rows, |row| conditions.get(row).unwrap_or(DEFAULT_CONDITION)) {
+        parts.entry(conditions.get(run.start).unwrap_or(DEFAULT_CONDITION)).or_default().push(run);
+    }
+    parts.into_iter().map(|(condition, rows)| (Some(condition), rows)).collect()
+}
+
+fn runs<K: PartialEq>(rows: Range<usize>, key: impl Fn(usize) -> K) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for row in rows {
+        match runs.last_mut() {
+            Some(run) if key(run.start) == key(row) => run.end = row + 1,
+            _ => runs.push(row..row + 1),
+        }
+    }
+    runs
+}

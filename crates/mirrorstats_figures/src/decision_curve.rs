@@ -1,0 +1,152 @@
+//! `decision-curve`: the Kaplan-Meier estimate of the share of episodes decided by step t.
+
+use std::collections::BTreeMap;
+
+use crate::kit::{
+    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Point, Sheet, Stroke, Swatch, legend, many,
+    marker, panels, rate_ticks, whole_ticks,
+};
+use crate::matrix::MetricId;
+use crate::{Drawn, FigureError, FigureName, Scene};
+use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
+use mirrorstats_statistics::durations::competing::{Ending, Outcome};
+use mirrorstats_statistics::durations::survival::Survival;
+
+const MOST_COLUMNS: usize = 3;
+const LEAST_PANEL: f64 = 120.0;
+const PLOT_HEIGHT: f64 = 130.0;
+const AXIS_ROOM: f64 = 34.0;
+const AXIS_BELOW: f64 = 28.0;
+/// The distance between markers along a curve, px.
+const MARKER_EVERY: f64 = 38.0;
+
+pub fn draw(scene: Scene<'_>, episodes: &EpisodeTable) -> Result<Drawn, FigureError> {
+    let endings = endings(episodes, scene.metrics)?;
+    let Scene { matrix, roster, width, .. } = scene;
+    let gap = AXIS_ROOM + 8.0;
+    let left = MARGIN + AXIS_ROOM;
+    let (columns, _) = panels::most(MOST_COLUMNS, width - left - MARGIN, [LEAST_PANEL, gap]);
+    let arranged = Arrangement { left, columns, height: PLOT_HEIGHT + AXIS_BELOW, gap };
+    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), width, arranged);
+    let mut sheet = panels.sheet(width);
+    let last = endings.values().flatten().map(|ending| ending.steps).max().unwrap_or(1).max(1);
+    for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
+        let plot = Plot::new(Frame { height: PLOT_HEIGHT, ..*body }, 0.0..real(last) * 1.03, 0.0..1.04);
+        plot.x_axis(&mut sheet, &whole_ticks(u32::try_from(last).unwrap_or(u32::MAX), 5));
+        plot.y_axis(&mut sheet, &rate_ticks());
+        plot.x_title(&mut sheet, "step t");
+        plot.y_title(&mut sheet, "share decided", 26.0);
+        for (at, member) in roster.0.iter().enumerate() {
+            let survival = endings.get(&(*experiment, member.model)).and_then(|endings| Survival::of(endings));
+            if let Some(survival) = survival {
+                let phase = many(at) / many(roster.0.len());
+                Curve { experiment, member: *member, survival, phase }.draw(&mut sheet, &plot);
+            }
+        }
+    }
+    let tick = Swatch::Tick(Stroke::solid(PALETTE.surface.quiet, 1.2));
+    let signs = vec![(tick, "episodes that end undecided, censored".to_owned())];
+    let height = legend::around(&mut sheet, roster, &panels, Swatch::Line, signs);
+    Ok((sheet, height))
+}
+
+/// The endings of the episodes of each experiment and model, by step.
+///
+/// The first metric is the duration; the second is defined if an episode is decided.
+fn endings<'e>(
+    episodes: &'e EpisodeTable,
+    metrics: &[MetricId<'_>],
+) -> Result<BTreeMap<(&'e str, &'e str), Vec<Ending>>, FigureError> {
+    let (duration, finished) = (column(episodes, metrics[0].name)?, column(episodes, metrics[1].name)?);
+    let mut endings: BTreeMap<(&str, &str), Vec<Ending>> = BTreeMap::new();
+    for ((key, step), finished) in episodes.keys.iter().zip(duration.iter()).zip(finished.iter()) {
+        let group = endings.entry((key.experiment, key.model)).or_default();
+        let outcome = if finished.is_some() { Outcome::Correct } else { Outcome::Unfinished };
+        group.extend(step.map(|steps| Ending { steps, outcome }));
+    }
+    Ok(endings)
+}
+
+fn column<'a>(episodes: &'a EpisodeTable, name: &str) -> Result<&'a MetricColumn, FigureError> {
+    episodes.metric(name).ok_or_else(|| {
+        let known = episodes.metrics.iter().map(|metric| metric.name.as_str()).collect::<Vec<_>>().join(", ");
+        FigureError::UnknownMetric { figure: FigureName::DecisionCurve, metric: name.to_owned(), known }
+    })
+}
+
+struct Curve<'a> {
+    experiment: &'a str,
+    member: Member<'a>,
+    survival: Survival,
+    /// The position of the first marker, in [0, 1) of a distance: markers of coinciding curves differ.
+    phase: f64,
+}
+
+impl Curve<'_> {
+    fn draw(&self, sheet: &mut Sheet, plot: &Plot) {
+        let mut corners = vec![plot.at(0.0, 0.0)];
+        let mut share = 0.0;
+        for point in &self.survival.points {
+            corners.push(plot.at(real(point.steps), share));
+            share = 1.0 - point.undecided;
+            corners.push(plot.at(real(point.steps), share));
+        }
+        sheet.mark(&self.mark(), |sheet| {
+            sheet.line(&corners, self.member.style.stroke(1.3));
+            self.censored(sheet, plot);
+            // The wait before the first decision is the same for all curves, and too crowded for markers.
+            let marked = if share > 0.0 { &corners[1..] } else { &corners[..] };
+            for place in along(marked, self.phase) {
+                marker::draw(sheet, place, 2.4, self.member.style);
+            }
+        });
+    }
+
+    fn censored(&self, sheet: &mut Sheet, plot: &Plot) {
+        let points = &self.survival.points;
+        for (at, point) in points.iter().enumerate() {
+            let later = points.get(at + 1).map_or(0, |next| next.at_risk);
+            if point.at_risk > point.decided + later {
+                let (x, y) = plot.at(real(point.steps), 1.0 - point.undecided);
+                sheet.line(&[(x, y - 3.0), (x, y + 3.0)], Stroke::solid(self.member.style.color, 1.2));
+            }
+        }
+    }
+
+    fn mark(&self) -> Mark {
+        let points = &self.survival.points;
+        let decided: u64 = points.iter().map(|point| point.decided).sum();
+        let n = points.first().map_or(0, |point| point.at_risk);
+        let median = self.survival.median();
+        let median_words = median.map_or("none".to_owned(), |step| format!("t = {step}"));
+        let model = self.member.model;
+        let title = format!("{} · {model}: {decided} of {n} decided, median {median_words}", self.experiment);
+        Mark::of_cell(title, self.experiment, model, "decided")
+            .value(points.last().map(|point| 1.0 - point.undecided))
+            .with("n", n)
+            .with("decided", decided)
+            .with("median", median.map(|step| step.to_string()).unwrap_or_default())
+    }
+}
+
+/// Evenly spaced points on a line; the first is `phase` of a distance from the start.
+fn along(points: &[Point], phase: f64) -> Vec<Point> {
+    let mut places = Vec::new();
+    let mut due = MARKER_EVERY * (phase + 0.2);
+    for pair in points.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let length = (to.0 - from.0).hypot(to.1 - from.1);
+        while due <= length {
+            let part = due / length;
+            places.push((from.0 + (to.0 - from.0) * part, from.1 + (to.1 - from.1) * part));
+            due += MARKER_EVERY;
+        }
+        due -= length;
+    }
+    places
+}
+
+#[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
+fn real(step: i64) -> f64 {
+    step as f64
+}

@@ -1,0 +1,34 @@
+//! The drawing kit: building blocks of figures, without knowledge of their content.
+
+#[cfg(feature = "raster")]
+pub mod convert;
+
+pub(super) mod dodge;
+pub(super) mod font;
+pub(super) mod label;
+pub(super) mod legend;
+pub(super) mod lettering;
+pub(super) mod marker;
+pub mod palette;
+pub(super) mod panels;
+pub(super) mod picture;
+pub(super) mod tiles;
+
+mod frame;
+mod look;
+mod mark;
+mod plot;
+mod roster;
+mod sheet;
+
+pub(super) use frame::{Frame, Point, many};
+pub(super) use legend::{Legend, Swatch};
+pub(super) use lettering::{FULL_WIDTH, Lettering, MARGIN, NAME_ROOM, TextAnchor, leading};
+pub(super) use look::{Fill, Rgb, Stroke};
+pub(super) use mark::Mark;
+pub(super) use marker::polar;
+pub(super) use palette::{PALETTE, text_on};
+pub(super) use panels::{Arrangement, Panels};
+pub(super) use plot::{Plot, Tick, rate_ticks, whole_ticks};
+pub(super) use roster::{Member, Roster};
+pub(super) use sheet::Sheet;

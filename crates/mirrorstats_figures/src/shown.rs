@@ -1,0 +1,210 @@
+//! The figures by name: their titles, and the metrics and captions that a style declares and the cells have.
+
+use std::fmt;
+use std::str::FromStr;
+use std::sync::LazyLock;
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::FigureError;
+use super::matrix::{Matrix, MetricId};
+use mirrorstats_exact::suggest::hint;
+use mirrorstats_metric::catalogs::catalog::{Catalog, Kind, Measures};
+use mirrorstats_metric::catalogs::relations::Relations;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum FigureName {
+    /// Behavioural profiles: one radar per experiment, one line per model.
+    Spider,
+    /// Models by experiments and metrics, coloured by goodness.
+    Heatmap,
+    /// Task success against self-attribution.
+    Scatter,
+    /// Completion-conditioned success minus success.
+    CompletionGap,
+    /// Final self-identification of the open-ended experiment.
+    E5Outcomes,
+    /// Task success with its interval and the level of chance.
+    Intervals,
+    /// Task success from the first experiment to every other.
+    Slopes,
+    /// Task success against the dose of a factor.
+    DoseResponse,
+    /// The share of episodes decided by step t.
+    DecisionCurve,
+    /// The mirror's time in view, per episode.
+    Gaze,
+}
+
+// In the order of a report; each file has this name and the extension of its format.
+mirrorstats_exact::names!(FigureName {
+    Spider: "spider",
+    Heatmap: "heatmap",
+    Scatter: "scatter",
+    CompletionGap: "completion-gap",
+    E5Outcomes: "e5-outcomes",
+    Intervals: "intervals",
+    Slopes: "slopes",
+    DoseResponse: "dose-response",
+    DecisionCurve: "decision-curve",
+    Gaze: "gaze",
+});
+
+impl fmt::Display for FigureName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for FigureName {
+    type Err = FigureError;
+
+    fn from_str(text: &str) -> Result<Self, FigureError> {
+        Self::named(text).ok_or_else(|| {
+            let known = Self::ALL.map(Self::name);
+            FigureError::UnknownFigure { name: text.to_owned(), known: known.join(", "), hint: hint(text, known) }
+        })
+    }
+}
+
+/// A style's declaration of one figure.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FigureSheet {
+    /// The metrics that it shows, in the order of its roles.
+    pub metrics: Option<Vec<String>>,
+    /// The words below it; `{0}` is the first metric, `{1}` the second.
+    pub caption: Option<String>,
+}
+
+pub type FigureSheets = IndexMap<String, FigureSheet>;
+
+pub static SHOWN: LazyLock<FigureSheets> =
+    LazyLock::new(|| toml::from_str(FIGURES).expect("the file comes with the program"));
+/// The same as TOML, as a base for styles.
+pub const FIGURES: &str = include_str!("../../../assets/styles/figures.toml");
+/// With more axes the labels overlap.
+const MOST_AXES: usize = 8;
+
+impl FigureName {
+    /// The title, for headings and screen readers.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Spider => "Behavioural profiles",
+            Self::Heatmap => "Performance across experiments and metrics",
+            Self::Scatter => "Task success against self-attribution",
+            Self::CompletionGap => "Completion gap",
+            Self::E5Outcomes => "Final self-identification outcomes",
+            Self::Intervals => "Task success with 95 % intervals",
+            Self::Slopes => "Task success from experiment to experiment",
+            Self::DoseResponse => "Task success against the dose",
+            Self::DecisionCurve => "Share of episodes decided by step t",
+            Self::Gaze => "Mirror in view, episode by episode",
+        }
+    }
+
+    /// The fewest and the most metrics that the figure shows; the first ones, by this number, must be rates.
+    pub const fn metrics(self) -> ([usize; 2], usize) {
+        const ANY: usize = 64;
+        match self {
+            Self::Spider => ([3, ANY], 0),
+            Self::Heatmap => ([1, ANY], 0),
+            Self::Scatter => ([3, 3], 2),
+            Self::CompletionGap => ([2, 2], 2),
+            Self::Intervals | Self::Slopes | Self::DoseResponse => ([1, 1], 1),
+            Self::DecisionCurve => ([2, 2], 0),
+            Self::E5Outcomes | Self::Gaze => ([0, 0], 0),
+        }
+    }
+
+    pub fn check_count(self, found: usize) -> Result<(), FigureError> {
+        let ([fewest, most], _) = self.metrics();
+        if (fewest..=most).contains(&found) {
+            return Ok(());
+        }
+        let wanted = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
+        Err(FigureError::MetricCount { figure: self, wanted, found })
+    }
+
+    pub(super) fn needs(self, metric: &str) -> String {
+        let is_built_in = SHOWN.get(self.name()).and_then(|sheet| sheet.metrics.as_ref());
+        if is_built_in.is_none_or(|listed| listed.iter().all(|name| name != metric)) {
+            return format!("the metric {metric}");
+        }
+        match self {
+            Self::Spider => "three metrics or more",
+            Self::Scatter => "two rates and a duration",
+            Self::CompletionGap => "a rate that `completes` another one",
+            Self::DecisionCurve => "a duration and the rate that is `finished`",
+            Self::Intervals | Self::Slopes | Self::DoseResponse => "a rate",
+            Self::Heatmap | Self::E5Outcomes | Self::Gaze => "metrics",
+        }
+        .to_owned()
+    }
+}
+
+pub(super) fn metrics<'a>(
+    figure: FigureName,
+    matrix: &Matrix<'a>,
+    sheets: &'a FigureSheets,
+) -> Result<Vec<MetricId<'a>>, FigureError> {
+    let listed = sheets.get(figure.name()).and_then(|sheet| sheet.metrics.as_deref()).unwrap_or_default();
+    let found: Result<Vec<_>, _> = listed.iter().map(|name| matrix.metric(figure, name)).collect();
+    let found = found.or_else(|error| instead(figure, matrix, listed).ok_or(error))?;
+    let quantity = found.iter().take(figure.metrics().1).find(|id| id.metric.kind == Kind::Quantity);
+    match quantity {
+        Some(id) => Err(FigureError::NotARate { figure, metric: id.name.to_owned() }),
+        None => Ok(found),
+    }
+}
+
+fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Option<Vec<MetricId<'a>>> {
+    let all = matrix.metrics();
+    let named = |name: &str| all.iter().find(|id| id.name == name).copied();
+    let related = |pair: fn(Relations) -> Option<[String; 2]>| {
+        pair(Relations::of(matrix.catalog()))?.iter().map(|name| named(name)).collect()
+    };
+    match figure {
+        FigureName::Heatmap => {
+            let known: Vec<_> = listed.iter().filter_map(|name| named(name)).collect();
+            Some(if known.is_empty() { all } else { known })
+        }
+        FigureName::Spider => (all.len() >= figure.metrics().0[0]).then(|| all.into_iter().take(MOST_AXES).collect()),
+        FigureName::Scatter => {
+            let measuring = |what| all.iter().filter(move |id| id.metric.measures() == Some(what)).copied();
+            let found: Vec<_> =
+                measuring(Measures::Rate).take(2).chain(measuring(Measures::Duration).take(1)).collect();
+            (found.len() == 3).then_some(found)
+        }
+        FigureName::Intervals | FigureName::Slopes | FigureName::DoseResponse => {
+            all.iter().find(|id| id.metric.kind == Kind::Rate).map(|id| vec![*id])
+        }
+        FigureName::CompletionGap => {
+            related(|found| found.completed.first().map(|(whole, same)| [same, whole].map(String::clone)))
+        }
+        FigureName::DecisionCurve => {
+            related(|found| found.durations.first().map(|(one, other)| [one, other].map(String::clone)))
+        }
+        FigureName::E5Outcomes | FigureName::Gaze => None,
+    }
+}
+
+/// The title over these metrics. Definitions of other domains have no task and no self to name: their metrics do.
+pub(super) fn title(figure: FigureName, metrics: &[MetricId<'_>], catalog: &Catalog) -> String {
+    let name = |at: usize| metrics.get(at).map_or("", |id| id.name);
+    match figure {
+        _ if catalog.domain.is_none() => figure.title().to_owned(),
+        FigureName::Scatter => format!("{} against {}", name(1), name(0)),
+        FigureName::Intervals => format!("{} with 95 % intervals", name(0)),
+        FigureName::Slopes => format!("{} from experiment to experiment", name(0)),
+        FigureName::DoseResponse => format!("{} against the dose", name(0)),
+        _ => figure.title().to_owned(),
+    }
+}
+
+pub(super) fn caption(figure: FigureName, metrics: &[MetricId<'_>], sheets: &FigureSheets) -> String {
+    let template = sheets.get(figure.name()).and_then(|sheet| sheet.caption.clone()).unwrap_or_default();
+    metrics.iter().enumerate().fold(template, |text, (at, id)| text.replace(&format!("{{{at}}}"), id.name))
+}

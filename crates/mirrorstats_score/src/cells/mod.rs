@@ -1,0 +1,93 @@
+//! Cells: the episodes of one group under one metric.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_metric::catalogs::catalog::{Catalog, Metric};
+use mirrorstats_statistics::intervals::interval::Interval;
+
+use interval::{CONFIDENCE, cell_interval};
+
+pub mod columns;
+pub mod group;
+pub mod interval;
+
+/// All cells of a report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cells {
+    /// The definitions that gave the values.
+    pub catalog: Catalog,
+    /// The key columns that were grouped by; `experiment, model` by default.
+    pub by: Vec<String>,
+    /// The metrics, in the order of the episode table.
+    pub metrics: Vec<String>,
+    /// The least and the largest possible mean of each metric; an empty vector means no bounds.
+    pub ranges: Vec<Interval>,
+    /// The groups, ascending by key; each has one cell per metric.
+    pub groups: Vec<Group>,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Cell<'c> {
+    pub key: &'c [KeyValue],
+    pub name: &'c str,
+    pub metric: &'c Metric,
+    pub moments: &'c Moments,
+    /// The 95 % interval of the mean; `None` if withheld.
+    pub interval: Option<Interval>,
+}
+
+impl Cells {
+    /// Every cell, by group and metric.
+    pub fn all(&self) -> impl Iterator<Item = Cell<'_>> {
+        self.groups.iter().flat_map(|group| (0..self.metrics.len()).filter_map(|at| self.at(group, at)))
+    }
+
+    pub fn of_metric<'c>(&'c self, group: &'c Group, name: &str) -> Option<Cell<'c>> {
+        self.at(group, self.metrics.iter().position(|metric| metric == name)?)
+    }
+
+    fn at<'c>(&'c self, group: &'c Group, at: usize) -> Option<Cell<'c>> {
+        let (name, moments) = (self.metrics[at].as_str(), &group.moments[at]);
+        let metric = self.catalog.metric.get(name)?;
+        let range = self.ranges.get(at).copied().unwrap_or(Interval::UNBOUNDED);
+        let (interval, _) = cell_interval(moments, metric, range, CONFIDENCE);
+        Some(Cell { key: &group.key, name, metric, moments, interval })
+    }
+}
+
+/// The episodes with one key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Group {
+    /// A value for each column of `by`.
+    pub key: Vec<KeyValue>,
+    /// The number of episodes, defined or not.
+    pub episodes: u64,
+    /// The moments of each metric, in the order of [`Cells::metrics`].
+    pub moments: Vec<Moments>,
+}
+
+/// A value of a key column; integers order as integers, before text. In JSON: null, a number or a string.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum KeyValue {
+    /// A null of an optional key column.
+    Missing,
+    /// `seed`, `run`.
+    Int(i64),
+    /// `experiment`, `model`, ...
+    Text(String),
+}
+
+impl fmt::Display for KeyValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing => Ok(()),
+            Self::Int(value) => value.fmt(f),
+            Self::Text(value) => value.fmt(f),
+        }
+    }
+}

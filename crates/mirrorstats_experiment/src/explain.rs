@@ -2,8 +2,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Answer, Behavior, Body, BodyShown, CameraKind, Colors, Cubes, Hand, Mark, MarkColor, Occluders, Others, Paint,
-    Pane, PaneKind, Picture, Start, Stated, Wall, Wearer,
+    Answer, Behavior, Body, BodyShown, CameraKind, Colors, Cubes, Hand, Look, Mark, MarkColor, Occluders, Others,
+    Paint, Pane, PaneKind, Picture, Start, Stated, Wall, Wearer,
 };
 use mirrorstats_exact::escape::visible;
 
@@ -69,6 +69,9 @@ pub fn explained(experiment: &Experiment, occlusion: Option<String>) -> String {
     }
     if let Some(Picture { width, height, fovy }) = experiment.view {
         line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
+    }
+    if experiment.look == Look::Textured {
+        line("look", "panelled walls, soft shadows, mirrors with a frame and a slight tint".to_owned());
     }
     let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
     line("decision", format!("{} {at}, compared with {}", experiment.decision.name(), experiment.truth.name()));

@@ -7,8 +7,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    AbsentColumn, Actions, Answer, Body, BodyShown, CameraKind, Colors, Cubes, Decision, MOST_MARKS, MOST_PANES, Mark,
-    Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
+    AbsentColumn, Actions, Answer, Body, BodyShown, CameraKind, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES,
+    Mark, Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
 };
 use mirrorstats_metric::shape::{ChanceLevel, Fraction};
 use mirrorstats_trace::episodes::answers::MOST_ANSWERS;
@@ -104,6 +104,9 @@ pub struct ExperimentTable {
     pub hand: Option<HandTable>,
     /// The size and the angle of the picture; the world's if absent.
     pub view: Option<Picture>,
+    /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, soft shadows, and frame and tint of a
+    /// mirror; `plain` if absent.
+    pub look: Option<Look>,
     /// The shape of all bodies: `mannequin`, or `humanoid`, the sizes of MuJoCo's standard humanoid; the world's if absent.
     pub body: Option<Body>,
 }

@@ -90,6 +90,9 @@ pub struct Spec {
     /// Columns that have no meaning for the task: its traces have none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub absent: Vec<AbsentColumn>,
+    /// How the room and its mirrors look.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub look: Look,
     /// The shape of all bodies; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<Body>,
@@ -283,6 +286,17 @@ pub enum CameraKind {
     /// A camera behind the body and above it, which looks over its head: 1.1 m behind, 2.0 m high, aimed at a point 1.7 m
     /// above where the body stands.
     Behind,
+}
+
+/// How the room and its mirrors look. What is visible is the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Look {
+    /// Walls of one grey each, mirrors without frame or tint.
+    #[default]
+    Plain,
+    /// Walls of panels, soft shadows, mirrors with a frame of wood and a slight tint.
+    Textured,
 }
 
 /// The shape of all bodies.

@@ -97,6 +97,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         hand,
         view: table.view,
         absent,
+        look: table.look.unwrap_or_default(),
         body: table.body,
     };
     // An invalid key can break valid relations, so relations of keys with errors are not checked.

@@ -1,20 +1,20 @@
-//! The cameras of a thread: one per picture size and body shape in the experiments.
+//! The cameras of a thread: one per picture size, look of the room and body shape in the experiments.
 
 use std::cell::RefCell;
 
-use mirrorstats_experiment::spec::Body;
+use mirrorstats_experiment::spec::{Body, Look};
 use mirrorstats_experiment::{Experiment, Spec};
 use mirrorstats_sim::camera::{Camera, CameraError};
 use mirrorstats_sim::config::WorldConfig;
 
-/// Cameras by picture size and body shape: a renderer keeps its textures, and its number of parts is fixed.
+/// Cameras by picture size, look and body shape: a renderer keeps its textures, and its number of parts is fixed.
 pub(super) struct Eyes(Vec<(Kind, RefCell<Camera>)>);
 
-type Kind = ([u32; 2], Body);
+type Kind = ([u32; 2], Look, Body);
 
 fn kind(config: &WorldConfig, experiment: &Spec) -> Kind {
-    let WorldConfig { eye, body, .. } = config.for_experiment(experiment);
-    ([eye.width, eye.height_px], body.shape)
+    let WorldConfig { eye, look, body, .. } = config.for_experiment(experiment);
+    ([eye.width, eye.height_px], look, body.shape)
 }
 
 impl Eyes {

@@ -10,6 +10,7 @@
 //! Rule: the sizes of planes never change after compiling, because a renderer caches them; panes are boxes.
 
 mod dress;
+mod shadow;
 
 pub(super) use dress::labelled;
 
@@ -58,6 +59,14 @@ pub mod group {
 const LABELLED_PARTS: [u32; 3] = [40, 24, 2];
 
 const ROOM: &str = include_str!("../../../assets/world/room.xml");
+/// The panels of textured walls, instead of the matte material.
+const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="edge" rgb1="1 1 1" markrgb="0.72 0.72 0.74" width="64" height="64"/>
+    <material name="panels" texture="panels" texuniform="true" texrepeat="0.9 0.9" specular="0" shininess="0" reflectance="0"/>
+  </asset>"#;
+
+/// Bars of a frame: top, bottom and both sides.
+pub(super) const BARS: usize = 4;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PaintMode {
     /// Lit, as the agent sees it.
@@ -232,7 +241,9 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
         scene.marks.iter().position(|mark| mark.wearer == wearer && mark.part.name() == part)
     };
     let front = || scene.marks.iter().position(|mark| mark.part == Part::Front);
-    if let Some(pane) = numbered("pane") {
+    if name.contains(shadow::NAMED) {
+        Item::Room
+    } else if let Some(pane) = numbered("pane") {
         Item::Pane(pane)
     } else if name == PATCH {
         Item::Mark(front().unwrap_or(MOST_MARKS - 1))
@@ -248,8 +259,16 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
 }
 
 pub(super) fn compile(config: &WorldConfig, paint: PaintMode, size: [usize; 2]) -> Result<MjModel, ModelError> {
-    let mut spec = MjSpec::from_xml_string(ROOM)?;
+    let is_textured = config.look == mirrorstats_experiment::spec::Look::Textured && paint == PaintMode::Lit;
+    let mut spec =
+        MjSpec::from_xml_string(&if is_textured { ROOM.replace("</asset>", PANELS) } else { ROOM.to_owned() })?;
     build_room(&mut spec, config, paint);
+    if is_textured {
+        for wall in ["wall_east", "wall_north", "wall_west", "wall_south"] {
+            spec.geom_mut(wall).expect("the room has this plane").set_material("panels");
+        }
+        build_boxes(&mut spec, "frame", MOST_PANES * BARS, config.room.size, paint);
+    }
     let largest = config.clutter.edges.iter().copied().fold(config.cubes.edge, f64::max);
     build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
     build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);
@@ -257,6 +276,9 @@ pub(super) fn compile(config: &WorldConfig, paint: PaintMode, size: [usize; 2]) 
         let mut humanoid = MjSpec::from_xml_string(BodyModel::new(config.body.shape).xml)?;
         let prefix = format!("{}_", body_name(body));
         spec.world_body_mut().attach_by_deep_copy(&mut humanoid, &prefix, "")?;
+    }
+    if is_textured {
+        shadow::build(&mut spec)?;
     }
     add_eyes(&mut spec, config);
     set_picture(&mut spec, config, paint, size);

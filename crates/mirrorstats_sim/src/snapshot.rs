@@ -76,7 +76,8 @@ fn frames(world: &World) -> Vec<Placed> {
 fn solids(stage: &Stage) -> Vec<Solid> {
     let model = stage.model();
     (0..stage.items().len())
-        .filter(|geom| stage.is_shown(*geom))
+        // Only shadows are translucent.
+        .filter(|geom| stage.is_shown(*geom) && model.geom_rgba()[*geom][3] >= 1.0)
         .map(|geom| Solid {
             name: model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned(),
             item: stage.items()[geom],

@@ -2,6 +2,7 @@
 //! show.
 
 use mirrorstats_experiment::Experiment;
+use mirrorstats_experiment::angle::Heading;
 use mirrorstats_experiment::file;
 use mirrorstats_experiment::spec::Body;
 use mirrorstats_sim::body::{Figure, Pose};
@@ -39,6 +40,14 @@ cubes = { kind = "none" }
 others = { least = 1, most = 1 }
 mirror = [{ kind = "delayed", delay = 3 }]
 mark = [{ part = "face", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
+
+[experiment.textured]
+title = "A mirror that looks like one"
+prompt = "exploration"
+look = "textured"
+cubes = { kind = "clutter", least = 3, most = 3, hides = 0 }
+others = { least = 1, most = 2 }
+mirror = [{}, { wall = "opposite" }]
 
 [experiment.painted]
 title = "A decoy in another colour"
@@ -141,6 +150,37 @@ fn holds_against_pictures(name: &str) {
 #[test]
 fn several_mirrors_agree_with_pictures() {
     holds_against_pictures("mirrors");
+}
+
+#[test]
+fn textured_mirrors_agree_with_pictures() {
+    holds_against_pictures("textured");
+}
+
+/// Textures change the picture but not visibility.
+#[test]
+fn textures_do_not_change_visibility() {
+    need::drawing();
+    let [textured, plain] = ["textured", "mirrors"].map(kind);
+    let config = config();
+    let scene = Scene::draw(&config, textured.clone(), 1, 1).unwrap();
+    let mut looks = [&textured, &plain].map(|experiment| {
+        let scene = Scene { experiment: experiment.clone(), ..scene.clone() };
+        World::new(&config, scene).unwrap()
+    });
+    let mut eyes = [textured, plain].map(|experiment| Camera::new(&config.for_experiment(&experiment)).unwrap());
+    let mut differs = 0;
+    for heading in 0..12 {
+        let pose = Pose { heading: Heading::new(heading), ..looks[0].pose() };
+        for world in &mut looks {
+            world.place_at(Figure::standing(pose), 1);
+        }
+        assert_eq!(looks[0].visibility(), looks[1].visibility());
+        let [one, other] = [0, 1].map(|at| eyes[at].frame(&looks[at]).unwrap());
+        differs += usize::from(one != other);
+        assert_eq!(one, eyes[0].frame(&looks[0]).unwrap(), "a picture comes again");
+    }
+    assert_eq!(differs, 12);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::input;
 use mirrorstats_experiment::Spec;
-use mirrorstats_experiment::spec::{Body, CameraKind, Cubes, Occluders, Others, is_default};
+use mirrorstats_experiment::spec::{Body, CameraKind, Cubes, Look, Occluders, Others, is_default};
 use mirrorstats_toml_spec::{At, Fault, Faults, Shape, Source, lay};
 
 const DEFAULT: &str = include_str!("../../../../assets/world/default.toml");
@@ -51,6 +51,10 @@ pub struct WorldConfig {
     pub evidence: EvidenceConfig,
     /// The length of an episode.
     pub episode: EpisodeConfig,
+    /// How the room and its mirrors look; experiments say it.
+    #[serde(default, skip_serializing_if = "is_default")]
+    #[schemars(skip)]
+    pub look: Look,
 }
 
 /// The closed square room.
@@ -361,6 +365,7 @@ impl WorldConfig {
             (world.eye.width, world.eye.height_px) = (picture.width, picture.height);
             world.eye.fovy = f64::from(picture.fovy);
         }
+        world.look = experiment.look;
         world.body.shape = experiment.body.unwrap_or(world.body.shape);
         if experiment.camera == CameraKind::Behind {
             (world.eye.forward, world.eye.height, world.eye.pitch) = BEHIND;

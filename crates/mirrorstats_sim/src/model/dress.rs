@@ -5,7 +5,7 @@ use mujoco_rs::prelude::{MjModel, MjtObjBase};
 use super::super::body::BodyModel;
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{AGENTS, Item, Sight, group, numbered};
+use super::{AGENTS, BARS, Item, Sight, group, numbered, shadow};
 use crate::scene::MOST_CUBES;
 use mirrorstats_experiment::angle::{Heading, Quaternion};
 use mirrorstats_experiment::spec::{MOST_MARKS, PaneKind};
@@ -29,7 +29,12 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
     let neutral = BodyModel::new(config.body.shape).neutral_parts;
     for (geom, item) in items.iter().enumerate() {
         match *item {
-            Item::Room => hide_wall(model, geom, pane.map(|(_, pane)| pane)),
+            Item::Room => {
+                hide_wall(model, geom, pane.map(|(_, pane)| pane));
+                frame(model, geom, scene, look, config);
+                let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned();
+                shadow::dress(model, geom, &name, scene, pane);
+            }
             Item::Pane(at) => hang(model, geom, scene.panes.get(at).filter(|_| pane.is_none()), config),
             Item::Cube(at) => put_cube(model, geom, scene.cubes.get(at).filter(|_| !is_window)),
             Item::Agent(agent) => {
@@ -160,6 +165,38 @@ fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &Worl
     model.geom_rbound_mut()[geom] = half.iter().sum();
     model.geom_rgba_mut()[geom] = paint(BLANK);
 }
+
+/// Half of the width of a frame's bars, m.
+const HALF_BAR: f64 = 0.03;
+
+/// Puts a frame's bar beside its pane, flush with it, so that it hides nothing; only direct views show frames.
+fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Sight, config: &WorldConfig) {
+    let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+    let Some(number) = numbered(name, "frame") else { return };
+    let pane = scene.panes.get(number / BARS).filter(|_| look == Sight::Direct);
+    let Some(pane) = pane else { return hide(model, geom) };
+    let [x, y] = pane.place.center(config);
+    let [out_x, out_y] = pane.place.heading().direction();
+    let (up, side) = (pane.height / 2.0 + HALF_BAR, pane.width / 2.0 + HALF_BAR);
+    // Relative to the middle of the pane: upwards, and to the left of a viewer who faces it.
+    let (rise, aside, half) = match number % BARS {
+        0 => (up, 0.0, [HALF_BAR, side + HALF_BAR]),
+        1 => (-up, 0.0, [HALF_BAR, side + HALF_BAR]),
+        2 => (0.0, side, [pane.height / 2.0, HALF_BAR]),
+        _ => (0.0, -side, [pane.height / 2.0, HALF_BAR]),
+    };
+    let depth = config.mirror.gap / 2.0;
+    let place = [x + depth * out_x - aside * out_y, y + depth * out_y + aside * out_x, pane.center_height + rise];
+    model.geom_pos_mut()[geom] = place;
+    model.geom_quat_mut()[geom] = facing_inwards(pane.place.heading()).0;
+    model.geom_group_mut()[geom] = group::ROOM;
+    model.geom_size_mut()[geom] = [half[0], half[1], depth];
+    model.geom_rbound_mut()[geom] = half[0] + half[1] + depth;
+    model.geom_rgba_mut()[geom] = paint(WOOD);
+}
+
+/// The paint of a frame.
+const WOOD: [u8; 3] = [88, 66, 48];
 
 fn facing_inwards(heading: Heading) -> Quaternion {
     let quarter = std::f64::consts::FRAC_1_SQRT_2;

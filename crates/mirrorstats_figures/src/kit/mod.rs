@@ -3,23 +3,19 @@
 #[cfg(feature = "raster")]
 pub mod convert;
 
-pub(super) mod dodge;
-pub(super) mod font;
-pub(super) mod label;
 pub(super) mod legend;
-pub(super) mod lettering;
-pub(super) mod marker;
-pub mod palette;
 pub(super) mod panels;
-pub(super) mod picture;
 pub(super) mod tiles;
 
+mod drawing;
 mod frame;
-mod look;
-mod mark;
 mod plot;
 mod roster;
 mod sheet;
+
+pub use drawing::palette;
+pub(super) use drawing::{dodge, font, label, lettering, marker, picture};
+use drawing::{ink, look, mark};
 
 pub(super) use frame::{Frame, Point, many};
 pub(super) use legend::{Legend, Swatch};

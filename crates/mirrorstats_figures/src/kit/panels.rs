@@ -81,7 +81,7 @@ pub(crate) fn most(most: usize, room: f64, [least, gap]: [f64; 2]) -> (usize, f6
 }
 
 /// The columns for `count` panels, at most `most`, in about equally full rows.
-fn balanced(count: usize, most: usize) -> usize {
+pub(crate) fn balanced(count: usize, most: usize) -> usize {
     let rows = count.div_ceil(most.max(1)).max(1);
     count.div_ceil(rows).max(1)
 }

@@ -2,35 +2,23 @@
 
 use std::ops::Range;
 
+use plotters::coord::CoordTranslate;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::ranged1d::{BoldPoints, Ranged};
+use plotters::coord::types::RangedCoordf64;
+
 use super::frame::{Frame, Point};
+use super::ink::UNITS_PER_PX;
 use super::lettering::{self, TextAnchor};
 use super::look::Stroke;
 use super::palette::PALETTE;
-use super::sheet::{HUNDREDTHS, Sheet, hundredths};
+use super::sheet::{Sheet, lattice};
+use mirrorstats_exact::number::Decimal;
 
 /// Two linear axes over a frame; y points up.
 pub(crate) struct Plot {
     pub frame: Frame,
-    x: Axis,
-    y: Axis,
-}
-
-/// A range of values over positions, from the first to the second, px.
-struct Axis {
-    values: Range<f64>,
-    ends: [f64; 2],
-}
-
-impl Axis {
-    /// The position of a value, a whole hundredth of a px towards the first end. A thousandth of a hundredth keeps
-    /// values that are on one where they are.
-    fn at(&self, value: f64) -> f64 {
-        let [from, to] = self.ends.map(hundredths);
-        let share = (value - self.values.start) / (self.values.end - self.values.start);
-        let moved = f64::from(to - from) * share;
-        let moved = if to > from { (moved + 1e-3).floor() } else { (moved - 1e-3).ceil() };
-        (f64::from(from) + moved) / HUNDREDTHS
-    }
+    spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -42,15 +30,14 @@ pub(crate) struct Tick {
 
 impl Plot {
     pub(crate) fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
-        let (x, y) = (
-            Axis { values: x, ends: [frame.left, frame.right()] },
-            Axis { values: y, ends: [frame.bottom(), frame.top] },
-        );
-        Self { frame, x, y }
+        let (left, top) = lattice((frame.left, frame.top));
+        let (right, bottom) = lattice((frame.right(), frame.bottom()));
+        Self { frame, spec: Cartesian2d::new(x, y, (left..right, bottom..top)) }
     }
 
     pub(crate) fn at(&self, x: f64, y: f64) -> Point {
-        (self.x.at(x), self.y.at(y))
+        let (x, y) = self.spec.translate(&(x, y));
+        (f64::from(x) / UNITS_PER_PX, f64::from(y) / UNITS_PER_PX)
     }
 
     pub(crate) fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
@@ -93,11 +80,11 @@ pub(crate) fn rate_ticks() -> Vec<Tick> {
     [(0.0, "0"), (0.25, ""), (0.5, "0.5"), (0.75, ""), (1.0, "1")].map(tick).into()
 }
 
-/// At most `most` integers from 0 to `last`, at even distances of 1, 2 or 5 times a power of ten.
-pub(crate) fn whole_ticks(last: u32, most: u32) -> Vec<Tick> {
-    let steps = (0..).flat_map(|power| [1, 2, 5].map(|digit| 10_u32.saturating_pow(power).saturating_mul(digit)));
-    let step = steps.take_while(|step| *step <= last).find(|step| last / step < most).unwrap_or(u32::MAX);
-    (0..=last / step).map(|n| Tick { at: f64::from(n * step), text: (n * step).to_string() }).collect()
+/// At most `most` integers from 0 to `last`, at even distances.
+pub(crate) fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
+    let axis = RangedCoordf64::from(0.0..f64::from(last));
+    let whole = axis.key_points(BoldPoints(most)).into_iter().filter(|at| at.fract() == 0.0);
+    whole.filter_map(|at| Some(Tick { at, text: Decimal::of_float(at, 0)?.to_string() })).collect()
 }
 
 fn grid() -> Stroke {

@@ -14,10 +14,10 @@ use mirrorstats_exact::escape::visible;
 /// The family name, which is private, so that no installed font replaces it.
 pub(crate) const FAMILY: &str = "Mirrorstats Sans";
 const SUBSTITUTE: char = '\u{25a1}';
-const REGULAR: &[u8] = include_bytes!("../../../../assets/fonts/MirrorstatsSans-Regular.ttf");
-const SEMIBOLD: &[u8] = include_bytes!("../../../../assets/fonts/MirrorstatsSans-Semibold.ttf");
-const REGULAR_WEB: &[u8] = include_bytes!("../../../../assets/fonts/MirrorstatsSans-Regular.woff2");
-const SEMIBOLD_WEB: &[u8] = include_bytes!("../../../../assets/fonts/MirrorstatsSans-Semibold.woff2");
+const REGULAR: &[u8] = include_bytes!("../../../../../assets/fonts/MirrorstatsSans-Regular.ttf");
+const SEMIBOLD: &[u8] = include_bytes!("../../../../../assets/fonts/MirrorstatsSans-Semibold.ttf");
+const REGULAR_WEB: &[u8] = include_bytes!("../../../../../assets/fonts/MirrorstatsSans-Regular.woff2");
+const SEMIBOLD_WEB: &[u8] = include_bytes!("../../../../../assets/fonts/MirrorstatsSans-Semibold.woff2");
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Weight {

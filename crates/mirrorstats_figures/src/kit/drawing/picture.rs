@@ -7,8 +7,8 @@ use std::path::Path;
 #[cfg(feature = "raster")]
 use crate::kit::convert::{self, ConvertError};
 use crate::kit::font;
+use crate::kit::ink::escaped;
 use crate::kit::sheet::Sheet;
-use crate::kit::sheet::escaped;
 use mirrorstats_exact::format::fixed;
 
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-use crate::kit::sheet::escaped;
+use crate::kit::ink::escaped;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::number;
 

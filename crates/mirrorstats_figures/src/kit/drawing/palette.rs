@@ -8,7 +8,7 @@ use crate::kit::frame::many;
 use crate::kit::look::{Rgb, Stroke};
 
 pub(crate) static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
-    let text = include_str!("../../../../assets/palette.toml");
+    let text = include_str!("../../../../../assets/palette.toml");
     toml::from_str(text).expect("the built-in palette is well-formed: a test reads it")
 });
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use plotters::style::RGBColor;
 use serde::Deserialize;
 
 /// A colour, written `#rrggbb`.
@@ -24,6 +25,12 @@ impl TryFrom<String> for Rgb {
 impl fmt::Display for Rgb {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
+    }
+}
+
+impl From<Rgb> for RGBColor {
+    fn from(Rgb(red, green, blue): Rgb) -> Self {
+        Self(red, green, blue)
     }
 }
 

@@ -61,7 +61,7 @@ fn done(request: &Request) -> String {
 fn of_all_experiments(backend: &str, wire_format: WireFormat) -> Vec<Request> {
     let server = Server::start(move |_, request| whole(wire_format, &done(request)));
     let folder = Folder::new();
-    let models = format!("[backend.own]\ndialect = \"{backend}\"\nkey = \"MIRRORSTATS_API_KEY\"\n");
+    let models = format!("[backend.own]\nwire_format = \"{backend}\"\nkey = \"MIRRORSTATS_API_KEY\"\n");
     std::fs::write(folder.path().join("models.toml"), models).unwrap();
     let mut command = program(folder.path());
     command.env("MIRRORSTATS_API_KEY", KEY).args([

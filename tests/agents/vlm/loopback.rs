@@ -93,7 +93,7 @@ fn prepare(folder: &Folder, options: &str) -> Vec<Provider> {
         let address = &provider.address;
         writeln!(
             models,
-            "[backend.{server}]\ndialect = \"{wire_format}\"\nkey = \"LOOPBACK_KEY\"\nbase_url = \"{address}{path}\""
+            "[backend.{server}]\nwire_format = \"{wire_format}\"\nkey = \"LOOPBACK_KEY\"\nbase_url = \"{address}{path}\""
         )
         .unwrap();
         for [name, id, keys, own] in served.into_iter().filter(|model| *model != NONE) {

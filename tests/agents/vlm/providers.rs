@@ -290,7 +290,7 @@ fn a_refused_parameter_is_named_with_the_line_that_mends_it() {
         let server = Server::start(move |_, _| answer.clone());
         let folder = Folder::new();
         let own = format!(
-            "[backend.own]\ndialect = \"{wire_format}\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
+            "[backend.own]\nwire_format = \"{wire_format}\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
              [model.\"Own 1\"]\nbackend = \"own\"\nid = \"own-1\"\n"
         );
         std::fs::write(folder.path().join("own.toml"), own).unwrap();

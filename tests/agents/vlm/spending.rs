@@ -245,7 +245,7 @@ fn timed_out_and_killed_requests_count_with_their_largest_cost() {
 
 /// `record` with a router that states each answer's cost, for a model without prices.
 fn routed(folder: &Folder, server: &Server, words: &str) -> Command {
-    let own = "[backend.router]\ndialect = \"openai-compatible\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
+    let own = "[backend.router]\nwire_format = \"openai-compatible\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
                [model.own]\nbackend = \"router\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\nmax_output_tokens = 100\n";
     std::fs::write(folder.path().join("own.toml"), own).unwrap();
     let words = format!("--models own.toml --backend router --threads 1 --in-flight 16 --json {words}");

@@ -99,6 +99,6 @@ pub use mirrorstats_score::evidence::Evidence;
 pub use mirrorstats_score::tables::columns::record_batch as episode_batch;
 pub use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
 pub use mirrorstats_study::{
-    Backend, Diff, DiffRequest, FigureOptions, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side,
+    Diff, DiffRequest, FigureOptions, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side,
     Study, StudyError, diff, resolve,
 };

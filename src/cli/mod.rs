@@ -95,10 +95,7 @@ pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
     let command = help::with_help(Cli::command());
     let settings = config::load(&command);
-    let command = match &settings {
-        Ok(settings) => settings.apply(command),
-        Err(_) => command,
-    };
+    let command = config::with_defaults(command, "", settings.as_deref().unwrap_or_default());
     let parse = |arguments: Vec<OsString>| {
         let matches = command.clone().try_get_matches_from(arguments)?;
         Cli::from_arg_matches(&matches)

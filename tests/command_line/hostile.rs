@@ -152,7 +152,6 @@ const NOT_SHOWN: [&str; 18] = [
     "world config",
     "world scene",
     "world sheet",
-    "setup config",
     "setup completions",
     "setup man",
 ];

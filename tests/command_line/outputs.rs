@@ -35,7 +35,6 @@ fn an_input_trace_is_refused_as_the_output() {
     for command in [
         &["score", "a.parquet", "b.parquet", "-o"][..],
         &["score", ".", "--engine", "native", "-o"],
-        &["figure", "spider", "a.parquet", "--format", "svg", "-o"],
         #[cfg(feature = "polars")]
         &["query", "SELECT * FROM steps", "a.parquet", "-o"],
         #[cfg(feature = "polars")]
@@ -93,7 +92,7 @@ fn a_copy_of_an_input_may_be_replaced() {
 
 /// Draws a figure to `target` with standard output going to `stdout`.
 fn figure(folder: &Path, target: &str, stdout: Stdio) -> std::process::Output {
-    let words = ["figure", "spider", "a.parquet", "--format", "svg", "-o", target];
+    let words = ["figure", "spider", "a.parquet", "-o", target];
     program(folder).args(words).stdout(stdout).output().unwrap()
 }
 

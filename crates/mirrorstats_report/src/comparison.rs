@@ -60,38 +60,29 @@ pub struct Difference {
 pub enum ComparisonError {
     #[error(
         "no table of the style `{style}` has all the published metrics ({metrics}): expected those of {tables}; \
-         name the table with --table, or give another --style"
+         give another --style"
     )]
     NoTable { style: String, metrics: String, tables: String },
-    #[error("the style `{style}` makes no table `{name}` of these scores: expected one of {tables}")]
-    UnknownTable { style: String, name: String, tables: String },
     #[error(
         "the style `{style}` prints no standard errors in its table `{table}`: compare with a style of mean and standard error, such as `paper`"
     )]
     NoStandardErrors { style: String, table: String },
 }
 
-/// The table to compare: the one called `name`, else the first that has all the published metrics.
+/// The table to compare: the first that has all the published metrics.
 pub fn choose<'t>(
     tables: &'t [MetricTable],
     published: &Published,
-    name: Option<&str>,
     style: &Style,
 ) -> Result<&'t MetricTable, ComparisonError> {
     let style = style.name.clone();
     let metrics: BTreeSet<&str> = published.cells.iter().map(|(cell, _)| cell.metric.as_str()).collect();
-    let table = match name {
-        Some(name) => tables.iter().find(|table| table.name == name).ok_or_else(|| ComparisonError::UnknownTable {
-            style: style.clone(),
-            name: name.to_owned(),
-            tables: tables.iter().map(|table| table.name.as_str()).collect::<Vec<_>>().join(", "),
-        })?,
-        None => tables.iter().find(|table| has_all(table, &metrics)).ok_or_else(|| ComparisonError::NoTable {
+    let table =
+        tables.iter().find(|table| has_all(table, &metrics)).ok_or_else(|| ComparisonError::NoTable {
             style: style.clone(),
             metrics: metrics.iter().copied().collect::<Vec<_>>().join(", "),
             tables: tables.iter().map(described).collect::<Vec<_>>().join(", "),
-        })?,
-    };
+        })?;
     let prints_se = table.form == crate::style::CellForm::MeanSe;
     if prints_se { Ok(table) } else { Err(ComparisonError::NoStandardErrors { style, table: table.name.clone() }) }
 }

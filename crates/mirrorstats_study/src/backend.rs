@@ -1,4 +1,4 @@
-//! The scoring backend: the native kernels, or the SQL lowering on Spark. The results are the same.
+//! Scores by the SQL lowering on Spark. The results are those of the native kernels.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -11,15 +11,6 @@ use mirrorstats_exact::replace::check_target;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::vocabulary::check_label;
-
-#[derive(Clone, Debug, Default)]
-pub enum Backend {
-    /// The native kernels.
-    #[default]
-    Native,
-    /// The SQL lowering on the user's own Spark.
-    Spark(Cluster),
-}
 
 /// A job for Spark, checked as far as possible without Spark.
 #[derive(Debug)]

@@ -71,7 +71,7 @@ use mirrorstats_trace::read::steps::Steps;
 
 pub use agreement::{CoderCount, LabelAgreement, LabelCount, PairAgreement};
 pub use audit::audit_tables;
-pub use backend::{Backend, SparkJob, are_uris};
+pub use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
 use figure_inputs::{Drawings, FigureInputs};
@@ -103,7 +103,6 @@ pub struct Study {
     stamps: Vec<Stamp>,
     source: Source,
     question: Question,
-    backend: Backend,
     threads: NonZeroUsize,
     plan: Option<RegisteredPlan>,
 }
@@ -126,7 +125,7 @@ impl Study {
             // Problems with definitions are reported with the answer: the caller may set others first.
             question = question.clone().resolved(traces).unwrap_or(question);
         }
-        Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads, plan: None })
+        Ok(Self { inputs, stamps, source, question, threads, plan: None })
     }
 
     /// Sets the definitions: `paper`, `extended`, or the path of a TOML file. Errors: a file that cannot be read; every
@@ -180,13 +179,6 @@ impl Study {
     #[must_use]
     pub const fn threads(mut self, threads: NonZeroUsize) -> Self {
         self.threads = threads;
-        self
-    }
-
-    /// Uses another engine to compute scores; the results are the same.
-    #[must_use]
-    pub fn backend(mut self, backend: Backend) -> Self {
-        self.backend = backend;
         self
     }
 
@@ -337,14 +329,12 @@ impl Study {
         Ok((one, definitions))
     }
 
-    /// Compares a table of the study with a published one, cell by cell. `table` names it; the default is the first
-    /// table that has all the published metrics. Errors: faults of the published table, the style or the inputs; an
-    /// unknown table.
+    /// Compares a table of the study with a published one, cell by cell: the first that has all the published
+    /// metrics. Errors: faults of the published table, the style or the inputs; no such table.
     pub fn compare(
         &self,
         published: &Path,
         style: impl AsRef<Path>,
-        table: Option<&str>,
         errata: &Errata,
     ) -> Result<PublishedComparison, StudyError> {
         // Small files first: a mistake in them should not cost a scan of the traces.
@@ -354,7 +344,7 @@ impl Study {
         let cells = self.cells_of(&counted.results.episodes)?;
         let left_out = (&counted.lost, None);
         let (tables, _) = self.tables(&counted.results.episodes, left_out, &cells, &style)?;
-        Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
+        Ok(compare(choose(&tables, &published, &style)?, &published, errata))
     }
 
     /// The files that an answer is made from: inputs, definitions and the style, if any. An output must not replace one

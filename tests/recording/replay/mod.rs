@@ -6,5 +6,4 @@ mod matching;
 #[cfg(unix)]
 mod outputs;
 mod pictures;
-mod recounted;
 mod traces;

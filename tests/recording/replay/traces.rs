@@ -27,18 +27,6 @@ pub static RECORDED: LazyLock<PathBuf> = LazyLock::new(|| {
     folder.join("runs")
 });
 
-/// A recording of E1 with the mirror in view, which one of fifty random runs has; made once.
-pub static WITH_SIGHT: LazyLock<PathBuf> = LazyLock::new(|| {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("replayed-with-sight");
-    drop(fs::remove_dir_all(&folder));
-    fs::create_dir_all(&folder).unwrap();
-    write_small_world(&folder, "episode.steps = 40\nevidence.mirror_self_px = 2\n");
-    let words =
-        "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 60 --no-frames --no-log";
-    succeeds(&mut typed(&folder, words));
-    folder.join("runs/E1-random.parquet")
-});
-
 pub fn recorded(experiment: &str) -> PathBuf {
     RECORDED.join(format!("{experiment}-random.parquet"))
 }

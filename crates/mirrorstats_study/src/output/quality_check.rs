@@ -5,20 +5,14 @@ use serde::Serialize;
 
 use crate::{Study, StudyError};
 use mirrorstats_score::quality::{CellKey, Quality, QualityByCell};
-use mirrorstats_statistics::losses::INFRASTRUCTURE;
 
-/// The largest allowed values; absent ones are not checked. Shares are of the replies of one cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// The largest allowed values; absent ones are not checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QualityLimits {
-    /// Replies without a decision.
+    /// The share of a cell's replies that have no decision.
     pub max_unreadable: Option<f64>,
-    pub max_refused: Option<f64>,
-    pub max_truncated: Option<f64>,
-    pub max_repaired: Option<f64>,
     /// Lost episodes, over all cells.
     pub max_lost: Option<u64>,
-    /// Milliseconds within which 95 % of a cell's replies arrived.
-    pub max_latency: Option<i64>,
 }
 
 /// The result of the check.
@@ -90,12 +84,9 @@ impl CellAnswer {
     }
 }
 
-/// An option, the largest value that it allows, and the value in the traces.
-type Compared = (&'static str, Option<f64>, Option<f64>);
-
 impl Study {
     /// Checks the replies of the traces against limits; also returns the reply quality.
-    pub fn check_quality(&self, limits: &QualityLimits) -> Result<(QualityCheckAnswer, QualityByCell), StudyError> {
+    pub fn check_quality(&self, limits: QualityLimits) -> Result<(QualityCheckAnswer, QualityByCell), StudyError> {
         let cells = self.quality()?;
         let (violations, not_recorded) = (limits.violations(&cells), limits.not_recorded(&cells));
         let holds = violations.is_empty() && not_recorded.is_empty();
@@ -104,51 +95,29 @@ impl Study {
 }
 
 impl QualityLimits {
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
+    fn violations(self, cells: &QualityByCell) -> Vec<Violation> {
+        let unreadable = cells.0.iter().filter_map(|(key, quality)| {
+            let share = (quality.replies() > 0).then(|| real(quality.unusable()) / real(quality.replies()));
+            exceeded(Some(key), "max-unreadable", self.max_unreadable?, share?)
+        });
+        let lost = cells.whole().lost.zip(self.max_lost);
+        let lost = lost.and_then(|(lost, most)| exceeded(None, "max-lost", real(most), real(lost)));
+        unreadable.chain(lost).collect()
     }
 
-    fn violations(&self, cells: &QualityByCell) -> Vec<Violation> {
-        let of_cell = |(key, quality)| self.compared(quality).map(|compared| exceeded(Some(key), compared));
-        let lost = ("max-lost", self.max_lost.map(real), cells.whole().lost.map(real));
-        cells.0.iter().flat_map(of_cell).chain([exceeded(None, lost)]).flatten().collect()
-    }
-
-    fn compared(&self, quality: &Quality) -> [Compared; 5] {
-        let share = |count: u64| (quality.replies() > 0).then(|| real(count) / real(quality.replies()));
-        #[expect(clippy::cast_precision_loss, reason = "milliseconds are far below 2^53")]
-        let ms = |ms: i64| ms as f64;
-        [
-            ("max-unreadable", self.max_unreadable, share(quality.unusable())),
-            ("max-refused", self.max_refused, share(quality.of_status("refusal"))),
-            ("max-truncated", self.max_truncated, share(quality.of_status("truncated"))),
-            ("max-repaired", self.max_repaired, share(quality.of_status("repaired"))),
-            ("max-latency", self.max_latency.map(ms), quality.latency(0.95).map(ms)),
-        ]
-    }
-
-    fn not_recorded(&self, cells: &QualityByCell) -> Vec<NotRecorded> {
+    fn not_recorded(self, cells: &QualityByCell) -> Vec<NotRecorded> {
         let of_cell = |(cell, quality): (&CellKey, &Quality)| {
-            let missing = self.missing(quality).into_iter().filter(|(_, is_asked, missing)| *is_asked && *missing > 0);
-            let (cell, steps) = (cell.clone(), quality.steps);
-            missing.map(move |(limit, _, missing)| NotRecorded { cell: cell.clone(), limit, missing, steps })
+            let steps = quality.steps;
+            let replies = steps.saturating_sub(quality.replies());
+            let lost = if quality.lost.is_none() { steps } else { replies };
+            [self.max_unreadable.map(|_| ("max-unreadable", replies)), self.max_lost.map(|_| ("max-lost", lost))]
+                .into_iter()
+                .flatten()
+                .filter(|(_, missing)| *missing > 0)
+                .map(|(limit, missing)| NotRecorded { cell: cell.clone(), limit, missing, steps })
+                .collect::<Vec<_>>()
         };
-        cells.0.iter().flat_map(of_cell).collect::<Vec<_>>()
-    }
-
-    fn missing(&self, quality: &Quality) -> [(&'static str, bool, u64); 6] {
-        let replies = quality.steps.saturating_sub(quality.replies());
-        // Replies lost to the infrastructure never arrived, so they have no latency.
-        let ended: u64 = INFRASTRUCTURE.iter().map(|status| quality.of_status(status)).sum();
-        let timed = quality.latencies.values().sum::<u64>() + ended;
-        [
-            ("max-unreadable", self.max_unreadable.is_some(), replies),
-            ("max-refused", self.max_refused.is_some(), replies),
-            ("max-truncated", self.max_truncated.is_some(), replies),
-            ("max-repaired", self.max_repaired.is_some(), replies),
-            ("max-latency", self.max_latency.is_some(), quality.steps.saturating_sub(timed)),
-            ("max-lost", self.max_lost.is_some(), if quality.lost.is_none() { quality.steps } else { replies }),
-        ]
+        cells.0.iter().flat_map(of_cell).collect()
     }
 }
 
@@ -157,7 +126,6 @@ fn real(count: u64) -> f64 {
     count as f64
 }
 
-fn exceeded(cell: Option<&CellKey>, (limit, expected, found): Compared) -> Option<Violation> {
-    let (expected, found) = expected.zip(found)?;
+fn exceeded(cell: Option<&CellKey>, limit: &'static str, expected: f64, found: f64) -> Option<Violation> {
     (found > expected).then(|| Violation { cell: cell.cloned(), limit, expected, found })
 }

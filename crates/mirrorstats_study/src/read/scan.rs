@@ -8,7 +8,8 @@ use crate::error::StudyError;
 use crate::inputs::{self, Source};
 use crate::question::STANDING_LABELS;
 use crate::results::{Outputs, Results};
-use crate::{Backend, Study, losses, own_definitions, scores};
+use crate::{Study, losses, own_definitions, scores};
+use mirrorstats_engines::spark::Cluster;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_report::cells::group::CONDITION;
 use mirrorstats_score::quality::{QualityByCell, QualityReader};
@@ -102,23 +103,26 @@ impl Study {
         Ok(results)
     }
 
+    /// The episode table, computed by Spark. Lost episodes, which Spark does not know, come from a scan. Errors: as
+    /// [`Study::score`]; scores in the place of traces; faults of Spark.
+    pub fn score_on(&self, cluster: Cluster) -> Result<EpisodeTable, StudyError> {
+        let traces = self.traces()?;
+        let episodes = SparkJob::of_study(self, cluster)?.score()?;
+        own_definitions::check(&self.question.bind(traces)?, traces, &episodes)?;
+        let mut results = Results::of(episodes);
+        if traces.column(REPLY_STATUS).is_some() {
+            let scanned = self.scan_traces(traces, Outputs { losses: true, ..Outputs::default() })?;
+            results = Results { episodes: results.episodes, ..scanned };
+        }
+        self.check_unchanged()?;
+        self.declare(&mut results)?;
+        Ok(results.episodes)
+    }
+
     fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
-        let mut results = match (&self.source, &self.backend) {
-            (Source::Scores(files), Backend::Native) => Results::of(scores::read(files, &self.question)?),
-            (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
-            (source, Backend::Spark(cluster)) => {
-                let scored = Results::of(SparkJob::of_study(self, cluster.clone())?.score()?);
-                if let Source::Traces(traces) = source {
-                    own_definitions::check(&self.question.bind(traces)?, traces, &scored.episodes)?;
-                }
-                // The other engine computes only scores; the other outputs come from a scan.
-                match source {
-                    Source::Traces(traces) if outputs.needs_steps(traces) => {
-                        Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
-                    }
-                    _ => scored,
-                }
-            }
+        let mut results = match &self.source {
+            Source::Scores(files) => Results::of(scores::read(files, &self.question)?),
+            Source::Traces(traces) => self.scan_traces(traces, outputs)?,
         };
         results.select(outputs);
         Ok(results)

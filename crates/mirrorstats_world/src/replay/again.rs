@@ -13,14 +13,13 @@ use mirrorstats_trace::episodes::palette::Color;
 use mirrorstats_trace::schema::{self, Value};
 
 /// The maximum number of rays per row and per column of the visibility grid.
-pub const MOST_RAYS: u32 = 4096;
+const MOST_RAYS: u32 = 4096;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
     pub experiment: Experiment,
     pub config: WorldConfig,
-    /// The same configuration with the grid and threshold of the trace's pixel counts: the recorded ones, unless the
-    /// pixels were recounted.
+    /// The same configuration with the grid and threshold of the trace's pixel counts.
     pub eye: WorldConfig,
 }
 

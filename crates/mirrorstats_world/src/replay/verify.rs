@@ -1,20 +1,18 @@
-//! Replays traces and compares rows and frames with the recorded ones; writes new frames, logs and counts on the way.
+//! Replays traces and compares rows and frames with the recorded ones; writes new frames and logs on the way.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, BooleanArray, Int32Array};
 use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::again::{Recipe, again};
 use super::error::{Divergence, ReplayError};
 use super::log::{Log, Seen};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
-use crate::sim::visibility::by_column;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::replace::TemporaryFolder;
 use mirrorstats_trace::episodes::episode::Episode;
@@ -47,19 +45,8 @@ pub struct RecordedTrace {
 pub struct Outputs {
     pub frames: Option<PathBuf>,
     pub log: Option<PathBuf>,
-    /// The trace with recomputed visibility.
-    pub recount: Option<Recount>,
     /// True if frames are not compared with those that agents saw.
     pub skip_frames: bool,
-}
-
-#[derive(Clone, Debug)]
-pub struct Recount {
-    pub out: PathBuf,
-    /// The threshold, pixels of the grid; by default the recorded one, scaled to the grid.
-    pub threshold: Option<u32>,
-    /// The grid of rays, width and height; by default the size of the view.
-    pub grid: Option<(u32, u32)>,
 }
 
 /// The result.
@@ -71,8 +58,6 @@ pub struct ReplayAnswer {
     pub steps: usize,
     /// The first divergence of each episode that has one.
     pub divergences: Vec<Divergence>,
-    /// Steps whose `mirror_visible` is another than before, with `--recompute-visibility`.
-    pub flipped: Option<usize>,
     /// The frames, where traces say what their agents saw.
     pub frames: Option<FramesAnswer>,
 }
@@ -115,16 +100,12 @@ impl RecordedTrace {
     }
 
     /// Rejects traces that would take too long to replay.
-    pub fn check_work(traces: &[Self], outputs: &Outputs) -> Result<(), ReplayError> {
+    pub fn check_work(traces: &[Self]) -> Result<(), ReplayError> {
         let bytes =
             traces.iter().map(|trace| std::fs::metadata(&trace.path).map_or(0, |metadata| metadata.len())).sum();
         let steps = |trace: &Self| trace.rows.iter().map(EpisodeRows::len).sum();
-        let all = traces.iter().map(|trace| rays(steps(trace), &trace.eye(outputs)));
+        let all = traces.iter().map(|trace| rays(steps(trace), &trace.recipe.eye));
         check_rays(all.fold(0, u64::saturating_add), bytes)
-    }
-
-    fn eye(&self, outputs: &Outputs) -> WorldConfig {
-        outputs.recount.as_ref().map_or_else(|| self.recipe.eye.clone(), |recount| recount.eye(&self.recipe))
     }
 
     /// Replays the episodes and adds to `answer`; `save` writes a frame as PNG.
@@ -134,30 +115,21 @@ impl RecordedTrace {
         answer: &mut ReplayAnswer,
         mut save: impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let eye = self.eye(outputs);
         let camera = self.camera(outputs, answer)?;
         let parts = TemporaryFolder::private("replay").map_err(ReplayError::other)?;
-        let mut player = TracePlayer { trace: self, outputs, eye: &eye, camera };
-        let (mut logs, mut rewritten) = (Vec::new(), Vec::new());
+        let mut player = TracePlayer { trace: self, outputs, camera };
+        let mut logs = Vec::new();
         for rows in &self.rows {
             let episode = rows.episode().map_err(ReplayError::other)?;
             let part = parts.path().join(format!("{}.mcap", logs.len()));
-            let (divergence, counts) = player.episode(&episode, &part, answer.frames.as_mut(), &mut save)?;
+            let divergence = player.episode(&episode, &part, answer.frames.as_mut(), &mut save)?;
             answer.episodes += 1;
             answer.steps += episode.steps.len();
             answer.divergences.extend(divergence);
             logs.push((assemble::place(&episode), part));
-            if outputs.recount.is_some() {
-                *answer.flipped.get_or_insert(0) += counts.flipped(&episode);
-                rewritten.push(rows.with_columns(&counts.columns()).map_err(ReplayError::other)?);
-            }
         }
         if let Some(path) = &outputs.log {
             assemble::write(path, &logs, &self.recording).map_err(ReplayError::other)?;
-        }
-        if let Some(recount) = &outputs.recount {
-            let recording = recounted(&self.recording, &eye);
-            merge::write(&recount.out, Some(&recording), &rewritten).map_err(ReplayError::other)?;
         }
         Ok(())
     }
@@ -212,24 +184,9 @@ impl FramesAnswer {
     }
 }
 
-impl Recount {
-    fn eye(&self, recipe: &Recipe) -> WorldConfig {
-        let mut config = recipe.eye.clone();
-        if let Some((width, height)) = self.grid {
-            let recorded = u64::from(config.eye.width) * u64::from(config.eye.height_px);
-            let scaled = u64::from(config.evidence.mirror_self_px) * u64::from(width) * u64::from(height);
-            config.evidence.mirror_self_px = u32::try_from(scaled.div_ceil(recorded.max(1))).unwrap_or(u32::MAX);
-            (config.eye.width, config.eye.height_px) = (width, height);
-        }
-        config.evidence.mirror_self_px = self.threshold.unwrap_or(config.evidence.mirror_self_px);
-        config
-    }
-}
-
 struct TracePlayer<'a> {
     trace: &'a RecordedTrace,
     outputs: &'a Outputs,
-    eye: &'a WorldConfig,
     camera: Option<Camera>,
 }
 
@@ -240,13 +197,12 @@ impl TracePlayer<'_> {
         part: &Path,
         mut frames: Option<&mut FramesAnswer>,
         save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
-    ) -> Result<(Option<Divergence>, RecordedCounts), E> {
+    ) -> Result<Option<Divergence>, E> {
         let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
         let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
         let mut log = log.transpose().map_err(unwritten)?;
-        let (mut counts, mut other_frame) = (RecordedCounts::default(), None);
-        let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {
-            counts.add(by_column(world, visibility), world.is_mirror_visible(visibility));
+        let mut other_frame = None;
+        let divergence = again(&self.trace.recipe, &self.trace.recipe.eye, episode, |t, world, visibility, step| {
             let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
             let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
             let recorded = step.extra.frame_digest.as_deref();
@@ -267,44 +223,8 @@ impl TracePlayer<'_> {
         if let Some(log) = log {
             log.end(episode).map_err(unwritten)?;
         }
-        let first = [divergence, other_frame].into_iter().flatten().min_by_key(|divergence| divergence.t);
-        Ok((first, counts))
+        Ok([divergence, other_frame].into_iter().flatten().min_by_key(|divergence| divergence.t))
     }
-}
-
-#[derive(Default)]
-struct RecordedCounts {
-    px: Vec<(&'static str, Vec<i32>)>,
-    visible: Vec<bool>,
-}
-
-impl RecordedCounts {
-    fn add(&mut self, counts: Vec<(&'static str, i32)>, visible: bool) {
-        // A scene has the same columns at every step.
-        self.px.resize_with(counts.len(), Default::default);
-        for (values, (column, count)) in self.px.iter_mut().zip(counts) {
-            values.0 = column;
-            values.1.push(count);
-        }
-        self.visible.push(visible);
-    }
-
-    fn flipped(&self, episode: &Episode) -> usize {
-        episode.steps.iter().zip(&self.visible).filter(|(step, visible)| step.mirror_visible != **visible).count()
-    }
-
-    fn columns(self) -> Vec<(&'static str, ArrayRef)> {
-        let px = self.px.into_iter().map(|(column, values)| (column, Arc::new(Int32Array::from(values)) as ArrayRef));
-        let visible: ArrayRef = Arc::new(BooleanArray::from(self.visible));
-        px.chain([("mirror_visible", visible)]).collect()
-    }
-}
-
-fn recounted(recording: &Value, eye: &WorldConfig) -> Value {
-    let mut recording = recording.clone();
-    recording["visibility_threshold_px"] = json!(eye.evidence.mirror_self_px);
-    recording["visibility_grid"] = json!({ "width": eye.eye.width, "height": eye.eye.height_px });
-    recording
 }
 
 pub fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {

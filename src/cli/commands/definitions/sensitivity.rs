@@ -27,9 +27,6 @@ pub struct SensitivityArgs {
     /// Write sensitivity.csv, .md and .tex, and the figure in every format, into this folder
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write the figure here; the ending says the format
-    #[arg(long, value_name = "FILE")]
-    pub figure: Option<PathBuf>,
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -40,19 +37,13 @@ const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex
 
 impl SensitivityArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        // Refuse an unknown format before a pass over the traces.
-        let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
         let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let mut targets = self.out.iter().flat_map(|out| names().map(|name| out.join(name))).chain(self.figure.clone());
-        targets.try_for_each(|path| output::check_target(&path, study.files_read(None)))?;
         if let Some(out) = &self.out {
+            names().try_for_each(|name| output::check_target(&out.join(name), study.files_read(None)))?;
             study.check_out(out)?;
         }
         let report = study.sensitivity(&self.thresholds)?;
         output::notes(&report.notes);
-        if let (Some(path), Some(format)) = (&self.figure, format) {
-            output::write_file(path, &format.encode(&report.figure).map_err(Failure::input)?)?;
-        }
         if let Some(out) = &self.out {
             write(out, &report)?;
         }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::scoring::with_plan;
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
@@ -20,8 +20,6 @@ pub struct ReportArgs {
     pub traces: TraceArgs,
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    #[command(flatten)]
-    pub engine: EngineArgs,
     /// The folder to write
     #[arg(short, long, value_name = "DIR", default_value = "reports/latest")]
     pub out: PathBuf,
@@ -58,7 +56,7 @@ pub struct ReportAnswer {
 
 impl ReportArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        let study = self.traces.study_on(&self.engine, &self.scoring, &self.grouping)?;
+        let study = self.traces.study(&self.scoring, &self.grouping)?;
         let study = with_plan(study, self.plan.as_deref())?;
         let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
         study.check_folder(&self.out, &options)?;

@@ -23,9 +23,6 @@ pub struct CompareArgs {
     /// The style that prints the tables: `paper` or a style file
     #[arg(long, value_name = "STYLE", default_value = PAPER_STYLE)]
     pub style: PathBuf,
-    /// The table to compare [default: the first that has all the published metrics]
-    #[arg(long, value_name = "NAME")]
-    pub table: Option<String>,
     /// Differences that are slips of the publication [default: those of the paper, with its style]
     #[arg(long, value_name = "FILE")]
     pub errata: Option<PathBuf>,
@@ -43,7 +40,7 @@ impl CompareArgs {
         let errata = self.errata()?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
         let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let comparison = study.compare(&self.published, &self.style, self.table.as_deref(), &errata)?;
+        let comparison = study.compare(&self.published, &self.style, &errata)?;
         output::print_rendered(&comparison, self.json, |found| found.render(terminal::width()))?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

@@ -9,6 +9,8 @@ use mirrorstats_report::figures::{Figure, FigureFormat};
 use mirrorstats_trace::inputs;
 use mirrorstats_world::replay::film_strip::{Steps, Strip};
 
+const FRAMES: usize = 6;
+
 /// Draw one episode as a row of frames: what was done and claimed at each, and when the mirror was in view
 ///
 /// Frames come from a log, or are rendered again from a trace. First sight, first claim and decision are marked.
@@ -23,11 +25,8 @@ pub struct FilmstripArgs {
     /// The picture to write: .png, .svg or .pdf
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
-    /// The number of frames
-    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=20))]
-    count: u16,
-    /// These steps instead of chosen ones
-    #[arg(long, value_name = "T,T,..", value_delimiter = ',', conflicts_with = "count")]
+    /// These steps instead of six chosen ones
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',')]
     steps: Option<Vec<i32>>,
 }
 
@@ -49,8 +48,7 @@ impl FilmstripArgs {
     }
 
     fn figure(&self) -> Result<Figure, Failure> {
-        let chosen = Steps::Chosen(usize::from(self.count));
-        let steps = self.steps.clone().map_or(chosen, Steps::Named);
+        let steps = self.steps.clone().map_or(Steps::Chosen(FRAMES), Steps::Named);
         let strip = Strip { episode: self.episode.clone(), steps };
         let (logs, traces) = self.sources()?;
         output::check_target(&self.out, &logs)?;

@@ -11,9 +11,8 @@ use mirrorstats_exact::replace::{self, is_same_file};
 use mirrorstats_trace::inputs;
 use mirrorstats_trace::log::read::{episode_hashes, other_episode};
 use mirrorstats_trace::renderer::Renderer;
-use mirrorstats_world::replay::again::MOST_RAYS;
 use mirrorstats_world::replay::error::{Divergence, ReplayError};
-use mirrorstats_world::replay::verify::{FramesAnswer, Outputs, RecordedTrace, Recount, ReplayAnswer, frame_path};
+use mirrorstats_world::replay::verify::{FramesAnswer, Outputs, RecordedTrace, ReplayAnswer, frame_path};
 
 /// Replay a trace's episodes in their recorded worlds, and compare every step with the recording
 ///
@@ -35,18 +34,6 @@ pub struct ReplayArgs {
     /// episodes is refused
     #[arg(long, value_name = "LOG.mcap")]
     mcap: Option<PathBuf>,
-    /// Recompute pixel counts and visibility, into the trace of --out; for a single trace
-    #[arg(long, requires = "out")]
-    recompute_visibility: bool,
-    /// The threshold for visibility, pixels of the grid [default: the recorded one, scaled to the grid]
-    #[arg(long, value_name = "PX", requires = "recompute_visibility")]
-    threshold: Option<u32>,
-    /// The grid of rays, such as 320x240 [default: the size of the view]
-    #[arg(long, value_name = "WxH", requires = "recompute_visibility", value_parser = grid)]
-    grid: Option<(u32, u32)>,
-    /// The trace to write with --recompute-visibility
-    #[arg(short, long, value_name = "TRACE.parquet", requires = "recompute_visibility")]
-    out: Option<PathBuf>,
     /// Do not compare frames; otherwise frames that an agent saw are drawn again and compared with their digests
     #[arg(long)]
     skip_frames: bool,
@@ -55,23 +42,15 @@ pub struct ReplayArgs {
     json: bool,
 }
 
-fn grid(text: &str) -> Result<(u32, u32), String> {
-    let sides = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
-    match sides {
-        Some((width @ 1..=MOST_RAYS, height @ 1..=MOST_RAYS)) => Ok((width, height)),
-        _ => Err(format!("expected a grid such as 320x240, at most {MOST_RAYS}x{MOST_RAYS}")),
-    }
-}
-
 impl ReplayArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let files = inputs::resolve(&self.traces, io::stdin()).map_err(Failure::input)?;
         output::note_stale_checksums(&files);
         let traces = RecordedTrace::open(&files, self.episode.as_deref())?;
-        if traces.len() > 1 && (self.mcap.is_some() || self.recompute_visibility) {
-            return Err(Failure::input("--mcap and --recompute-visibility take a single trace"));
+        if traces.len() > 1 && self.mcap.is_some() {
+            return Err(Failure::input("--mcap takes a single trace"));
         }
-        RecordedTrace::check_work(&traces, &self.outputs())?;
+        RecordedTrace::check_work(&traces)?;
         self.check_targets(&traces)?;
         let mut answer = ReplayAnswer::default();
         for trace in &traces {
@@ -82,21 +61,13 @@ impl ReplayArgs {
     }
 
     fn outputs(&self) -> Outputs {
-        let out = self.out.clone().filter(|_| self.recompute_visibility);
-        let recount = out.map(|out| Recount { out, threshold: self.threshold, grid: self.grid });
-        let skip_frames = self.skip_frames;
-        Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount, skip_frames }
+        Outputs { frames: self.frames.clone(), log: self.mcap.clone(), skip_frames: self.skip_frames }
     }
 
     fn check_targets(&self, traces: &[RecordedTrace]) -> Result<(), Failure> {
-        for (option, target) in [("--mcap", &self.mcap), ("--out", &self.out)] {
-            let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
-            if target.as_ref().is_some_and(is_trace) {
-                return Err(Failure::input(format!("{option} is the trace itself; name another file")));
-            }
-        }
-        if self.mcap.is_some() && self.mcap == self.out {
-            return Err(Failure::input("--mcap and --out: expected two files, found one name"));
+        let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
+        if self.mcap.as_ref().is_some_and(is_trace) {
+            return Err(Failure::input("--mcap is the trace itself; name another file"));
         }
         for (folder, trace) in self.frames.iter().flat_map(|folder| traces.iter().map(move |trace| (folder, trace))) {
             for (rows, t) in trace.rows.iter().flat_map(|rows| (1..=rows.len()).map(move |t| (rows, t))) {
@@ -186,13 +157,9 @@ fn tell(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
     }
     write!(text, "{}, {} replayed", counted(answer.episodes as u64, "episode"), counted(answer.steps as u64, "step"))?;
     match answer.divergences.len() {
-        0 => write!(text, ": all match")?,
-        1 => write!(text, ": 1 of the episodes parts from the trace")?,
-        parted => write!(text, ": {parted} of the episodes part from the trace")?,
-    }
-    match answer.flipped {
-        Some(flipped) => writeln!(text, "; mirror_visible differs at {}", counted(flipped as u64, "step"))?,
-        None => writeln!(text)?,
+        0 => writeln!(text, ": all match")?,
+        1 => writeln!(text, ": 1 of the episodes parts from the trace")?,
+        parted => writeln!(text, ": {parted} of the episodes part from the trace")?,
     }
     answer.frames.as_ref().map_or(Ok(()), |frames| tell_frames(text, frames))
 }

@@ -136,7 +136,7 @@ const SHOWN: [&str; 27] = [
 ];
 
 /// Verbs whose output has no name of a trace.
-const NOT_SHOWN: [&str; 18] = [
+const NOT_SHOWN: [&str; 17] = [
     "plan",
     "record",
     "trace schema",

@@ -144,7 +144,8 @@ fn a_folder_with_inputs_is_refused_as_the_output() {
     assert!(run(folder.path(), &["view", "runs", "--export", "runs"]).refused().contains("name another one"));
     // The library, and so Python, refuses it too.
     let study = mirrorstats::Study::open([&runs]).unwrap();
-    let report = study.report(&mirrorstats::ReportOptions { figures: false, ..Default::default() }).unwrap();
+    let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
+    let report = mirrorstats::report(&study, &options).unwrap();
     assert!(report.write(&runs).unwrap_err().to_string().contains("expected a folder for outputs"));
     // A new folder inside is allowed, because commands that read traces skip reports.
     run(folder.path(), &["report", "runs", "--no-figures", "--out", "runs/report"]).done();

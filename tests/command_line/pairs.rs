@@ -33,7 +33,7 @@ struct Walk {
 }
 
 /// Verbs that read no file of others.
-const WITHOUT_INPUT: [(&str, &str); 9] = [
+const WITHOUT_INPUT: [(&str, &str); 8] = [
     ("definitions show", "prints what is built in"),
     ("experiments show", "prints what is built in"),
     ("plan", "numbers of its command line"),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use mirrorstats::Study;
 use mirrorstats_exact::number::full_precision;
-use mirrorstats_study::Thresholds;
+use mirrorstats_study::sensitivity::{Thresholds, sensitivity};
 use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::write::write_episodes;
 use proptest::prelude::*;
@@ -115,7 +115,7 @@ fn compare(inputs: &str, px: u32) {
     fs::write(&edited, format!("include = [\"paper\"]\n[let]\nvisible = \"mirror_self_px >= {px}\"\n")).unwrap();
     let by_hand = Study::open([inputs]).unwrap().definitions(edited.to_str().unwrap()).unwrap().cells().unwrap();
     let study = Study::open([inputs]).unwrap();
-    let report = study.sensitivity(&px.to_string().parse::<Thresholds>().unwrap()).unwrap();
+    let report = sensitivity(&study, &px.to_string().parse::<Thresholds>().unwrap()).unwrap();
     let as_is = study.cells().unwrap();
     assert_eq!(report.found.metrics, ["MCR", "MTATO", "CR", "MGD", "SC", "AR_SC"]);
     let mut compared = 0;

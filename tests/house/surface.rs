@@ -65,7 +65,12 @@ fn the_public_names_of_the_library_are_listed() {
     Table
     diff
     episode_batch
+    explain
+    figure
+    gate
     record_batch
+    report
     resolve
+    statistics
     ");
 }

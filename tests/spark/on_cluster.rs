@@ -146,11 +146,8 @@ fn the_scores_of_files_are_the_native_ones(cluster: &Cluster) {
 fn nothing_runs_on_when_the_program_is_gone(cluster: &Cluster) {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["--spark-log", "log", "--spark-conf", "spark.sql.shuffle.partitions=2000"];
-    let mut child = started(&mut on(
-        cluster,
-        folder.path(),
-        &[&[fixture("paper").to_str().unwrap()], &arguments[..]].concat(),
-    ));
+    let mut child =
+        started(&mut on(cluster, folder.path(), &[&[fixture("paper").to_str().unwrap()], &arguments[..]].concat()));
     let running = || cluster.state()["activeapps"].as_array().is_some_and(|apps| !apps.is_empty());
     wait_for("the application", || running().then_some(()));
     let driver = || word_after(&folder.path().join("log"), "Successfully started service 'SparkUI' on port ");

@@ -77,12 +77,11 @@ pub fn choose<'t>(
 ) -> Result<&'t MetricTable, ComparisonError> {
     let style = style.name.clone();
     let metrics: BTreeSet<&str> = published.cells.iter().map(|(cell, _)| cell.metric.as_str()).collect();
-    let table =
-        tables.iter().find(|table| has_all(table, &metrics)).ok_or_else(|| ComparisonError::NoTable {
-            style: style.clone(),
-            metrics: metrics.iter().copied().collect::<Vec<_>>().join(", "),
-            tables: tables.iter().map(described).collect::<Vec<_>>().join(", "),
-        })?;
+    let table = tables.iter().find(|table| has_all(table, &metrics)).ok_or_else(|| ComparisonError::NoTable {
+        style: style.clone(),
+        metrics: metrics.iter().copied().collect::<Vec<_>>().join(", "),
+        tables: tables.iter().map(described).collect::<Vec<_>>().join(", "),
+    })?;
     let prints_se = table.form == crate::style::CellForm::MeanSe;
     if prints_se { Ok(table) } else { Err(ComparisonError::NoStandardErrors { style, table: table.name.clone() }) }
 }

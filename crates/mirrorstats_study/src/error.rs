@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::io;
 
-use super::own_definitions::ScoredAlike;
-use super::provenance::ProvenanceError;
+use crate::own_definitions::ScoredAlike;
+use crate::provenance::ProvenanceError;
 use mirrorstats_engines::spark::SparkError;
 use mirrorstats_exact::budget::Exceeded;
 use mirrorstats_exact::moments::MomentOverflow;
@@ -217,7 +217,7 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    pub(super) fn file(name: &str, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+    pub(crate) fn file(name: &str, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::File { name: name.to_owned(), source: source.into() }
     }
 

@@ -10,7 +10,7 @@ use std::time::{Duration, UNIX_EPOCH};
 
 use super::error::{Renamed, ViewError};
 use mirrorstats_exact::replace::{FolderError, folder_of};
-use mirrorstats_study::resolve;
+use mirrorstats_study::inputs::resolve;
 use mirrorstats_trace::episodes::labels::list_beside;
 use mirrorstats_trace::episodes::lost::list_of;
 use mirrorstats_trace::inputs::Input;

@@ -12,7 +12,11 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::input;
 use mirrorstats_report::html;
 use mirrorstats_report::plan::register::RegisteredPlan;
-use mirrorstats_study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};
+use mirrorstats_study::inputs::resolve;
+use mirrorstats_study::losses::LostAs;
+use mirrorstats_study::own_definitions::ScoredAlike;
+use mirrorstats_study::question::Question;
+use mirrorstats_study::{Study, StudyError};
 use mirrorstats_trace::inputs::Input;
 
 impl TraceArgs {

@@ -6,7 +6,7 @@ use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::replace::Content;
 use mirrorstats_report::figures::FigureFormat;
-use mirrorstats_study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
+use mirrorstats_study::sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, sensitivity};
 
 /// Show how every cell depends on the threshold of mirror evidence, and where a conclusion changes
 ///
@@ -42,7 +42,7 @@ impl SensitivityArgs {
             names().try_for_each(|name| output::check_target(&out.join(name), study.files_read(None)))?;
             study.check_out(out)?;
         }
-        let report = study.sensitivity(&self.thresholds)?;
+        let report = sensitivity(&study, &self.thresholds)?;
         output::notes(&report.notes);
         if let Some(out) = &self.out {
             write(out, &report)?;

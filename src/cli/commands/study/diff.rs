@@ -9,7 +9,8 @@ use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_report::cells::diff::Changes;
 use mirrorstats_report::cells::group::DEFAULT_BY;
 use mirrorstats_report::changes::Limit;
-use mirrorstats_study::{DiffRequest, Side, diff, resolve};
+use mirrorstats_study::diff::{DiffRequest, Side, diff};
+use mirrorstats_study::inputs::resolve;
 
 /// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
 #[derive(Clone, Debug, clap::Args)]

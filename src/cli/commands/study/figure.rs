@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_report::figures::{FigureFormat, FigureName, FigureWidth};
-use mirrorstats_study::{FigureOptions, MANY_MODELS};
+use mirrorstats_study::figure::{FigureOptions, MANY_MODELS, figure};
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
@@ -52,7 +52,7 @@ impl FigureArgs {
         }
         let Self { style, metric: metrics, title, width, top, .. } = self;
         let top = top.map(usize::from);
-        let figure = study.figure(self.name, &FigureOptions { style, metrics, title, width, top })?;
+        let figure = figure(&study, self.name, &FigureOptions { style, metrics, title, width, top })?;
         if top.is_none() && figure.models() > MANY_MODELS {
             output::say(&format!("note: {} models in one figure; --top 12 draws the best 12", figure.models()));
         }

@@ -73,7 +73,7 @@ mod rows {
     use mirrorstats_engines::polars::statement;
     use mirrorstats_exact::replace::is_stream;
     use mirrorstats_report::tables::Table as Printed;
-    use mirrorstats_study::StudyError;
+    use mirrorstats_study::{StudyError, query};
 
     const NULL: &str = "NULL";
 
@@ -85,8 +85,8 @@ mod rows {
         if let Some(path) = &args.output {
             output::check_target(path, study.files_read(None))?;
         }
-        let failed = |error: StudyError| failed(error, || study.in_duckdb(&query));
-        let (frame, note) = study.query(&query).map_err(failed)?;
+        let failed = |error: StudyError| failed(error, || query::in_duckdb(&study, &query));
+        let (frame, note) = query::query(&study, &query).map_err(failed)?;
         output::notes(note.as_slice());
         match (format, &args.output) {
             (None, path) => {

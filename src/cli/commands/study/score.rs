@@ -13,7 +13,10 @@ use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace::is_stream;
 use mirrorstats_score::format::Format;
 use mirrorstats_score::tables::table::EpisodeTable;
-use mirrorstats_study::{SparkJob, Study, are_uris, write_scores};
+use mirrorstats_study::Study;
+use mirrorstats_study::explain::explain;
+use mirrorstats_study::scores;
+use mirrorstats_study::spark::{SparkJob, are_uris};
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -90,7 +93,7 @@ impl ScoreArgs {
         let study = self.study()?;
         self.check_target(study.files_read(None))?;
         if let Some(episode) = &self.explain {
-            return output::print(&study.explain(episode)?, self.json);
+            return output::print(&explain(&study, episode)?, self.json);
         }
         let table = study.score()?.episodes;
         self.deliver(&table, format)?;
@@ -154,9 +157,9 @@ impl ScoreArgs {
         let threads = self.traces.threads.count();
         match &self.output {
             Some(path) => {
-                output::write_file_with(path, |file| Ok(write_scores(table, format, BufWriter::new(file), threads)?))
+                output::write_file_with(path, |file| Ok(scores::write(table, format, BufWriter::new(file), threads)?))
             }
-            None => Ok(write_scores(table, format, BufWriter::new(io::stdout()), threads)?),
+            None => Ok(scores::write(table, format, BufWriter::new(io::stdout()), threads)?),
         }
     }
 }

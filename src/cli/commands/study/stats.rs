@@ -8,6 +8,7 @@ use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::suggest::hint;
 use mirrorstats_report::statistics::text::Length;
 use mirrorstats_report::statistics::{Options, Sequential, Statistics};
+use mirrorstats_study::statistics::{sequential, statistics};
 
 const ALL: &str = "all";
 
@@ -55,9 +56,9 @@ impl StatsArgs {
         let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
         let options = Options { confidence, horizon, improvements, ..Options::default() };
         if self.sequential {
-            self.print_sequential(&study.sequential(&options)?)
+            self.print_sequential(&sequential(&study, &options)?)
         } else {
-            self.print(&study.statistics(&options)?)
+            self.print(&statistics(&study.grouped()?, &options)?)
         }
     }
 

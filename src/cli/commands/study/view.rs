@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_study::Question;
+use mirrorstats_study::question::Question;
 use mirrorstats_trace::episodes::labels::check_coder;
 use mirrorstats_trace::inputs;
 use mirrorstats_view::{Options, View, ViewError, export, film, routes};

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::rounding::Rounding;
 use mirrorstats_report::audit::MOST_EPISODES;
-use mirrorstats_study::audit_tables;
+use mirrorstats_study::audit::audit_tables;
 
 /// Name the cells of published tables whose mean and standard error no data can give
 #[derive(Clone, Debug, clap::Args)]

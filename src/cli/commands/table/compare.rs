@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_report::errata::{Errata, ErrataError};
+use mirrorstats_study::published::compare;
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";
@@ -40,7 +41,7 @@ impl CompareArgs {
         let errata = self.errata()?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
         let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let comparison = study.compare(&self.published, &self.style, &errata)?;
+        let comparison = compare(&study, &self.published, &self.style, &errata)?;
         output::print_rendered(&comparison, self.json, |found| found.render(terminal::width()))?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

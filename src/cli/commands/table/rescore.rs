@@ -15,7 +15,8 @@ use mirrorstats_report::bundle::Manifest;
 use mirrorstats_report::cells::diff::Changes;
 use mirrorstats_report::changes::Limit;
 use mirrorstats_report::tables::Table;
-use mirrorstats_study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored, traces_of};
+use mirrorstats_study::report::WrittenReport;
+use mirrorstats_study::rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_world::replay::reparse::{Diverged, ReparseAnswer};
 

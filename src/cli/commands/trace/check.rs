@@ -6,9 +6,9 @@ use crate::cli::args::{self, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::fixed;
-use mirrorstats_report::layout::quality;
+use mirrorstats_report::layout;
 use mirrorstats_score::quality::{CellKey, Quality, QualityByCell};
-use mirrorstats_study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
+use mirrorstats_study::quality::{self, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///
@@ -37,7 +37,8 @@ impl CheckArgs {
             return Err(Failure::input(words));
         }
         let limits = QualityLimits { max_unreadable: self.max_unreadable, max_lost: self.max_lost };
-        let (answer, cells) = self.traces.open()?.check_quality(limits)?;
+        let cells = quality::quality(&self.traces.open()?)?;
+        let answer = QualityCheckAnswer::of(&cells, limits);
         if self.json {
             output::print_json(&answer)?;
         } else {
@@ -49,7 +50,7 @@ impl CheckArgs {
 
 fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    out.write_all(quality::text(cells, crate::cli::terminal::width()).as_bytes())?;
+    out.write_all(layout::quality::text(cells, crate::cli::terminal::width()).as_bytes())?;
     writeln!(out)?;
     let named = |cell: &CellKey| match cell.condition.as_str() {
         _ if !cells.has_conditions() => format!("{}, {}: ", visible(&cell.experiment), visible(&cell.model)),

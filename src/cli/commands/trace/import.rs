@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::{Failure, Outcome, output};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use mirrorstats_exact::replace;
-use mirrorstats_study::ImportRequest;
+use mirrorstats_study::import::{ImportRequest, import};
 use mirrorstats_trace::import::{Format, Mapping, Text};
 
 /// Make a trace of another harness's steps or logs
@@ -71,7 +71,7 @@ impl ImportArgs {
             clusters_by_seed: self.cluster.is_some(),
             reconstruction: self.reconstruction,
         };
-        output::print(&mirrorstats_study::import(texts, &request)?, self.json)
+        output::print(&import(texts, &request)?, self.json)
     }
 
     fn check_places(&self) -> Result<(), Failure> {

@@ -10,10 +10,10 @@ use crate::cli::args::TraceArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
-use mirrorstats_report::layout::quality;
+use mirrorstats_report::layout;
 use mirrorstats_report::tables::{Table, wrapped};
 use mirrorstats_score::quality::QualityByCell;
-use mirrorstats_study::CellAnswer;
+use mirrorstats_study::quality::{CellAnswer, has_quality, quality};
 use mirrorstats_trace::footers::answered::by_others;
 use mirrorstats_trace::footers::checksums::Checksums;
 use mirrorstats_trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
@@ -51,13 +51,13 @@ impl InfoCommand {
             write!(io::stdout().lock(), "{}", list_of(episodes).within(terminal::width()))?;
             return Ok(Outcome::Done);
         }
-        let quality = if study.has_quality()? { study.quality()? } else { QualityByCell::default() };
+        let cells = if has_quality(&study)? { quality(&study)? } else { QualityByCell::default() };
         let mut out = io::stdout().lock();
         if self.json {
-            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: CellAnswer::of_all(&quality) }))?;
+            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: CellAnswer::of_all(&cells) }))?;
         } else {
             print(&mut out, &info, terminal::width())?;
-            let text = quality::text(&quality, terminal::width());
+            let text = layout::quality::text(&cells, terminal::width());
             if !text.is_empty() {
                 writeln!(out, "\nreplies by experiment and model\n{text}")?;
             }

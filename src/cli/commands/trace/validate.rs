@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::{Failure, Outcome, output};
-use mirrorstats_study::{findings, findings_text};
+use mirrorstats_study::findings::{findings, findings_text};
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::footers::answered::by_others;
 use mirrorstats_trace::inputs;

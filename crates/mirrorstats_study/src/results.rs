@@ -92,7 +92,7 @@ impl Results {
     }
 
     /// The results of the `most` best models by a metric.
-    pub(crate) fn of_the_best(self, most: usize, metric: &str) -> Self {
+    pub(crate) fn best_models(self, most: usize, metric: &str) -> Self {
         let episodes = &self.episodes;
         let Some(column) = episodes.metric(metric) else { return self };
         let mut means = model_means(episodes, column);

@@ -7,15 +7,16 @@
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
-use crate::error::StudyError;
 use crate::losses::{self, Counted};
+use crate::question::Question;
 use crate::results::Results;
 use crate::scan::{ids, lost_episodes};
-use crate::{Question, Study, own_definitions};
+use crate::statistics::statistics;
+use crate::{Study, StudyError, own_definitions};
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::{Definitions, ReplaceError};
+use mirrorstats_report::cells::Cells;
 use mirrorstats_report::cells::group::{DEFAULT_BY, group};
-use mirrorstats_report::cells::{Cells, Group};
 use mirrorstats_report::figures::Figure;
 use mirrorstats_report::figures::sensitivity::{self as drawing, Stage};
 use mirrorstats_report::sensitivity::{Level, Reference, Sensitivity};
@@ -68,75 +69,67 @@ pub struct SensitivityReport {
     pub notes: Vec<String>,
 }
 
-impl Study {
-    /// Scores the study under each threshold of mirror evidence and under the unchanged definitions, in one scan.
-    /// Errors: as [`Study::statistics`]; scores, or traces that do not record `mirror_self_px` at every step;
-    /// definitions without a `let` named `visible` that is true or false at each step; metrics that do not depend on
-    /// it.
-    pub fn sensitivity(&self, thresholds: &Thresholds) -> Result<SensitivityReport, StudyError> {
-        let traces = self.source.traces()?;
-        check_pixels(traces)?;
-        let style = Style::load("default")?;
-        let trial = Trial::of(&self.question, traces, thresholds)?;
-        let scored = self.scan_trial(&trial, traces);
-        self.check_unchanged()?;
-        let stages = self.stages(&trial, scored?)?;
-        let lost = stages.first().map_or(0, |stage| stage.lost);
-        let levels: Vec<Level> = stages.iter().map(|stage| stage.level.clone()).collect();
-        let found = Sensitivity::of(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
-        let labels: Vec<Stage<'_>> =
-            stages.iter().map(|stage| Stage { px: stage.level.px, cells: &stage.drawn }).collect();
-        let drawn = drawing::SensitivityInput {
-            stages: &labels,
-            metrics: &trial.moved,
-            order: &style.sheet.row_order,
-            reference: &trial.reference.words(),
-        };
-        Ok(SensitivityReport { found, figure: drawing::draw(&drawn)?, notes: trial.notes(lost) })
-    }
+/// Scores a study under each threshold of mirror evidence and under the unchanged definitions, in one scan. Errors: as
+/// [`statistics`]; scores, or traces that do not record `mirror_self_px` at every step; definitions without a `let`
+/// named `visible` that is true or false at each step; metrics that do not depend on it.
+pub fn sensitivity(study: &Study, thresholds: &Thresholds) -> Result<SensitivityReport, StudyError> {
+    let traces = study.traces()?;
+    check_pixels(traces)?;
+    let style = Style::load("default")?;
+    let trial = Trial::of(&study.question, traces, thresholds)?;
+    let scored = scan(study, &trial, traces);
+    study.check_unchanged()?;
+    let stages = stages(study, &trial, scored?)?;
+    let lost = stages.first().map_or(0, |stage| stage.lost);
+    let levels: Vec<Level> = stages.iter().map(|stage| stage.level.clone()).collect();
+    let found = Sensitivity::of(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
+    let labels: Vec<Stage<'_>> = stages.iter().map(|stage| Stage { px: stage.level.px, cells: &stage.drawn }).collect();
+    let drawn = drawing::SensitivityInput {
+        stages: &labels,
+        metrics: &trial.moved,
+        order: &style.sheet.row_order,
+        reference: &trial.reference.words(),
+    };
+    Ok(SensitivityReport { found, figure: drawing::draw(&drawn)?, notes: trial.notes(lost) })
+}
 
-    fn scan_trial(&self, trial: &Trial, traces: &TraceSet) -> Result<Vec<EpisodeTable>, StudyError> {
-        let labels = self.question.labels_over(traces);
-        let outputs = Outputs { labels: &labels, ..Outputs::default() };
-        let all: Vec<&Definitions> =
-            trial.definitions.iter().chain([&trial.pixels]).chain(trial.lost.as_ref()).collect();
-        let tables = score_traces::score_all(traces, &all, outputs, self.threads)?.tables;
-        tables.first().map_or(Ok(()), |table| own_definitions::check(&trial.definitions[0], traces, table))?;
-        Ok(tables)
-    }
+fn scan(study: &Study, trial: &Trial, traces: &TraceSet) -> Result<Vec<EpisodeTable>, StudyError> {
+    let labels = study.question.labels_over(traces);
+    let outputs = Outputs { labels: &labels, ..Outputs::default() };
+    let all: Vec<&Definitions> = trial.definitions.iter().chain([&trial.pixels]).chain(trial.lost.as_ref()).collect();
+    let tables = score_traces::score_all(traces, &all, outputs, study.threads)?.tables;
+    tables.first().map_or(Ok(()), |table| own_definitions::check(&trial.definitions[0], traces, table))?;
+    Ok(tables)
+}
 
-    fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<ScoredLevel>, StudyError> {
-        let mut others = tables.split_off(trial.definitions.len()).into_iter();
-        let pixels = others.next();
-        let lost = others.next().map(|table| ids(&table));
-        self.check_filter(tables.iter().map(EpisodeTable::len).max().unwrap_or(0))?;
-        let counted: Vec<Counted> = tables
-            .into_iter()
-            .map(|table| self.counted_table(table, lost.clone()))
-            .collect::<Result<_, StudyError>>()?;
-        if let Some(pixels) = &pixels {
-            check_values(pixels, counted.iter().map(|counted| &counted.results.episodes))?;
-        }
-        let px = [None].into_iter().chain(trial.thresholds.iter().copied().map(Some));
-        px.zip(counted).map(|(px, counted)| self.stage(px, &counted)).collect()
+fn stages(study: &Study, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<ScoredLevel>, StudyError> {
+    let mut others = tables.split_off(trial.definitions.len()).into_iter();
+    let pixels = others.next();
+    let lost = others.next().map(|table| ids(&table));
+    study.check_filter(tables.iter().map(EpisodeTable::len).max().unwrap_or(0))?;
+    let counted = |table| {
+        let mut results = Results { lost: lost.clone(), ..Results::of(table) };
+        study.declare(&mut results)?;
+        Ok(Counted::of(results, study.question.lost))
+    };
+    let counted: Vec<Counted> = tables.into_iter().map(counted).collect::<Result<_, StudyError>>()?;
+    if let Some(pixels) = &pixels {
+        check_values(pixels, counted.iter().map(|counted| &counted.results.episodes))?;
     }
+    let px = [None].into_iter().chain(trial.thresholds.iter().copied().map(Some));
+    px.zip(counted).map(|(px, counted)| stage(study, px, counted)).collect()
+}
 
-    fn counted_table(&self, table: EpisodeTable, lost: Option<BTreeSet<String>>) -> Result<Counted, StudyError> {
-        let mut results = Results { lost, ..Results::of(table) };
-        self.declare(&mut results)?;
-        Ok(self.counted(results))
-    }
-
-    fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<ScoredLevel, StudyError> {
-        let cells = self.cells_of(&counted.results.episodes)?;
-        // Conclusions need no intervals of cells; their bootstraps would take most of the time.
-        let none = |group: &Group| Group { moments: Vec::new(), ..group.clone() };
-        let bare = Cells { metrics: Vec::new(), groups: cells.groups.iter().map(none).collect(), ..cells.clone() };
-        let statistics = self.statistics_of(counted, &bare, &Options::default())?;
-        let shown = counted.results.with_conditions_as_models();
-        let drawn = group(&shown.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(ScoredLevel { level: Level { px, cells, statistics }, drawn, lost: counted.lost.total() })
-    }
+fn stage(study: &Study, px: Option<u32>, counted: Counted) -> Result<ScoredLevel, StudyError> {
+    let mut grouped = study.group(counted)?;
+    let cells = grouped.cells.clone();
+    // Conclusions need no intervals of cells; their bootstraps would take most of the time.
+    grouped.cells.metrics.clear();
+    grouped.cells.groups.iter_mut().for_each(|group| group.moments.clear());
+    let statistics = statistics(&grouped, &Options::default())?;
+    let shown = grouped.counted.results.with_conditions_as_models();
+    let drawn = group(&shown.episodes, &DEFAULT_BY.map(str::to_owned))?;
+    Ok(ScoredLevel { level: Level { px, cells, statistics }, drawn, lost: grouped.counted.lost.total() })
 }
 
 struct ScoredLevel {
@@ -191,7 +184,7 @@ impl Trial {
             notes.push(format!("the filter depends on `{EVIDENCE}`: each threshold keeps its own episodes"));
         }
         if lost > 0 {
-            notes.push(format!("{}: in no denominator", losses::told(lost)));
+            notes.push(format!("{}: in no denominator", losses::lost_episodes(lost)));
         }
         notes
     }

@@ -9,9 +9,10 @@ use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use crate::error::StudyError;
 use crate::inputs::{ScoreFile, Source, Stamp};
-use crate::{LostAs, Question, Study, own_definitions, scores};
+use crate::losses::LostAs;
+use crate::question::Question;
+use crate::{Study, StudyError, own_definitions, scores};
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_report::cells::diff::{Changes, Flip, Overlap};
 use mirrorstats_report::cells::group::DEFAULT_BY;
@@ -109,36 +110,33 @@ pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> 
     Ok(Diff { changes, notes })
 }
 
-impl Study {
-    /// The changes from this study to another: cells, and episodes by their ids. Two studies of the same traces under
-    /// one filter are scored in one scan, which gives the timesteps that decided each difference. Other studies lack
-    /// these timesteps, and a note says so. Errors: as [`Study::score`] for either study; sums of squares beyond 128
-    /// bits.
-    pub fn diff(&self, other: &Self) -> Result<Diff, StudyError> {
-        let by = self.question.by.clone().unwrap_or_else(|| DEFAULT_BY.map(str::to_owned).to_vec());
-        if self.differs_in_definitions_alone(other) {
-            let side = |study: &Self| Side::Definitions(study.question.definitions_name().to_owned());
-            let (metrics, filter) = (self.question.metrics.clone(), self.question.filter.clone());
-            let request = DiffRequest { metrics, filter, by, threads: self.threads, ..DiffRequest::default() };
-            return diff(&side(self), &side(other), &self.inputs, &request);
-        }
-        let style = Style::load("default")?;
-        let [before, after] = [self.score()?, other.score()?].map(|results| Scored::of(results.episodes, None));
-        let changes = Pair { before, after, evidence: None }.of_common_metrics().changes(&by, &style)?;
-        let notes = if changes.flips.is_empty() {
-            Vec::new()
-        } else {
-            let why = "the two studies are not of the same traces under one filter";
-            vec![format!("the timesteps that decided are not known: {why}")]
-        };
-        Ok(Diff { changes, notes })
+/// The changes from one study to another: cells, and episodes by their ids. Two studies of the same traces under one
+/// filter are scored in one scan, which gives the timesteps that decided each difference. Other studies lack these
+/// timesteps, and a note says so. Errors: as [`Study::score`] for either study; sums of squares beyond 128 bits.
+pub fn diff_studies(before: &Study, after: &Study) -> Result<Diff, StudyError> {
+    let by = before.question.by.clone().unwrap_or_else(|| DEFAULT_BY.map(str::to_owned).to_vec());
+    if differ_in_definitions_alone(before, after) {
+        let side = |study: &Study| Side::Definitions(study.question.definitions_name().to_owned());
+        let (metrics, filter) = (before.question.metrics.clone(), before.question.filter.clone());
+        let request = DiffRequest { metrics, filter, by, threads: before.threads, ..DiffRequest::default() };
+        return diff(&side(before), &side(after), &before.inputs, &request);
     }
+    let style = Style::load("default")?;
+    let [mut before, mut after] = [before.score()?, after.score()?].map(|results| Scored::of(results.episodes, None));
+    let common: Vec<String> = after.metrics.iter().filter(|name| before.metrics.contains(name)).cloned().collect();
+    for side in [&mut before, &mut after] {
+        side.table.metrics.retain(|metric| common.contains(&metric.name));
+    }
+    let changes = Pair { before, after, evidence: None }.changes(&by, &style)?;
+    let why = "the two studies are not of the same traces under one filter";
+    let note = (!changes.flips.is_empty()).then(|| format!("the timesteps that decided are not known: {why}"));
+    Ok(Diff { changes, notes: note.into_iter().collect() })
+}
 
-    fn differs_in_definitions_alone(&self, other: &Self) -> bool {
-        let question = |study: &Self| Question { definitions: None, ..study.question.clone() };
-        let are_traces = [self, other].iter().all(|study| matches!(study.source, Source::Traces(_)));
-        are_traces && self.stamps == other.stamps && question(self) == question(other)
-    }
+fn differ_in_definitions_alone(one: &Study, other: &Study) -> bool {
+    let question = |study: &Study| Question { definitions: None, ..study.question.clone() };
+    let are_traces = [one, other].iter().all(|study| matches!(study.source, Source::Traces(_)));
+    are_traces && one.stamps == other.stamps && question(one) == question(other)
 }
 
 impl Side {
@@ -224,15 +222,6 @@ impl Side {
 }
 
 impl Pair {
-    fn of_common_metrics(mut self) -> Self {
-        let common: Vec<String> =
-            self.after.metrics.iter().filter(|name| self.before.metrics.contains(name)).cloned().collect();
-        for side in [&mut self.before, &mut self.after] {
-            side.table.metrics.retain(|metric| common.contains(&metric.name));
-        }
-        self
-    }
-
     fn score(old: &Side, new: &Side, traces: Option<&TraceSet>, request: &DiffRequest) -> Result<Self, StudyError> {
         let (old_metrics, old_table) = old.read(traces, request)?;
         let (new_metrics, new_table) = new.read(traces, request)?;

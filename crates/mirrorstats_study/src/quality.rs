@@ -1,10 +1,17 @@
-//! Limits on reply quality: which of them the traces exceed, and which cannot be checked.
+//! Reply quality, and limits on it: which of them the traces exceed, and which cannot be checked.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::results::Results;
+use crate::scan::{UNCHECKED, ids, lost_episodes};
 use crate::{Study, StudyError};
-use mirrorstats_score::quality::{CellKey, Quality, QualityByCell};
+use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, QualityReader};
+use mirrorstats_score::score_traces::{self, Scored};
+use mirrorstats_score::tables::table::CONDITION;
+use mirrorstats_score::vocabulary;
+use mirrorstats_trace::episodes::lost;
 
 /// The largest allowed values; absent ones are not checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,14 +91,42 @@ impl CellAnswer {
     }
 }
 
-impl Study {
-    /// Checks the replies of the traces against limits; also returns the reply quality.
-    pub fn check_quality(&self, limits: QualityLimits) -> Result<(QualityCheckAnswer, QualityByCell), StudyError> {
-        let cells = self.quality()?;
-        let (violations, not_recorded) = (limits.violations(&cells), limits.not_recorded(&cells));
+impl QualityCheckAnswer {
+    /// Checks the reply quality of cells against limits.
+    pub fn of(cells: &QualityByCell, limits: QualityLimits) -> Self {
+        let (violations, not_recorded) = (limits.violations(cells), limits.not_recorded(cells));
         let holds = violations.is_empty() && not_recorded.is_empty();
-        Ok((QualityCheckAnswer { holds, violations, not_recorded, cells: CellAnswer::of_all(&cells) }, cells))
+        Self { holds, violations, not_recorded, cells: CellAnswer::of_all(cells) }
     }
+}
+
+/// Returns true if the traces record replies, or episodes were lost. Errors: scores, which have no replies; a list
+/// of lost episodes that cannot be read.
+pub fn has_quality(study: &Study) -> Result<bool, StudyError> {
+    let reader = QualityReader::of(study.traces()?);
+    Ok(!reader.columns().is_empty() || !lost::beside(&study.inputs)?.is_empty())
+}
+
+/// The reply quality of all episodes, lost ones included. Errors: scores, which have no replies; faults of the
+/// traces or of the list of lost episodes.
+pub fn quality(study: &Study) -> Result<QualityByCell, StudyError> {
+    let traces = study.traces()?;
+    let reader = QualityReader::of(traces);
+    let columns = vocabulary::trace_columns(traces);
+    let all = Definitions::from_toml("all", "open = true", &columns)?;
+    let nobody = all.clone().filtered("nobody", "false", &columns)?;
+    let lost = lost_episodes(traces)?;
+    let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
+    let wanted =
+        score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader), unchecked: &UNCHECKED };
+    let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
+    let Scored { tables: [episodes, ended], quality, .. } =
+        score_traces::score_each(traces, definitions, wanted, study.threads)?;
+    let lost = lost.map(|_| ids(&ended));
+    let mut results = Results { lost, quality, ..Results::of(episodes) };
+    study.declare(&mut results)?;
+    study.check_unchanged()?;
+    Ok(results.quality.unwrap_or_default())
 }
 
 impl QualityLimits {

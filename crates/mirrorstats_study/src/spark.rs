@@ -3,8 +3,8 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use super::error::StudyError;
-use super::{Question, Study};
+use crate::question::Question;
+use crate::{Study, StudyError};
 use mirrorstats_engines::spark::source::{Sources, is_uri};
 use mirrorstats_engines::spark::{self, Cluster, Job, SparkError, Written};
 use mirrorstats_exact::replace::check_target;
@@ -24,7 +24,7 @@ pub struct SparkJob {
 
 impl SparkJob {
     pub fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
-        let traces = study.source.traces()?;
+        let traces = study.traces()?;
         let mut labels = study.question.labels_over(traces);
         labels.retain(|label| !traces.is_label_column(label));
         labels.iter().try_for_each(|label| check_label(traces, label))?;

@@ -31,7 +31,7 @@ pub fn print_told<T: Serialize>(
         return print_json(answer);
     }
     let mut text = String::new();
-    tell(&mut text, answer).map_err(Failure::input)?;
+    tell(&mut text, answer)?;
     plain(visible_lines(text.trim_end()) + "\n")
 }
 
@@ -117,7 +117,7 @@ pub fn commit(file: NewFile, path: &Path) -> Result<(), Failure> {
 
 /// Refuses an output that is one of the files that the command reads.
 pub fn check_target<P: AsRef<Path>>(target: &Path, read: impl IntoIterator<Item = P>) -> Result<(), Failure> {
-    replace::check_target(target, read, "one that is read").map_err(Failure::input)
+    Ok(replace::check_target(target, read, "one that is read")?)
 }
 
 pub fn unwritable(path: &Path, error: io::Error) -> Failure {

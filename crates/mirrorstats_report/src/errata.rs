@@ -63,7 +63,7 @@ pub enum Field {
 pub enum ErrataError {
     #[error("errata {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error(transparent)]
+    #[error("{0}")]
     Faults(#[from] Faults),
 }
 

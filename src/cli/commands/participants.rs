@@ -36,7 +36,7 @@ enum ParticipantsCommand {
 impl ParticipantsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let ParticipantsCommand::Remove { code, folder, json } = self.command;
-        let removed = participants::remove(&folder, &code).map_err(Failure::input)?;
+        let removed = participants::remove(&folder, &code).map_err(Failure::Input)?;
         if removed == Removed::default() {
             let (code, folder) = (visible(&code), folder.display());
             return Err(Failure::input(format!("{folder} has nothing of the participant `{code}`")));

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::CommandFactory as _;
+use clap::{Command, CommandFactory as _};
 use clap_complete::Shell;
 
 use crate::cli::{Cli, Failure, NAME, Outcome, help, output};
@@ -11,55 +11,41 @@ use mirrorstats_exact::replace::Content;
 /// Write completions of a shell and manual pages
 #[derive(Debug, clap::Subcommand)]
 pub enum SetupCommand {
-    Completions(CompletionsArgs),
-    Man(ManArgs),
+    /// Print completions of command lines for a shell
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+    /// Write manual pages into a folder, one per command
+    Man {
+        /// The folder; it is created if it does not exist
+        folder: PathBuf,
+    },
 }
 
 impl SetupCommand {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
-            Self::Completions(args) => args.run(),
-            Self::Man(args) => args.run(),
+            Self::Completions { shell } => {
+                let mut text = Vec::new();
+                clap_complete::generate(shell, &mut Cli::command(), NAME, &mut text);
+                output::plain(text)
+            }
+            Self::Man { folder } => {
+                let mut command = help::with_examples_alone(Cli::command());
+                command.build();
+                let mut made = Vec::new();
+                pages(&command, &mut made)?;
+                let files: Vec<_> = made.iter().map(|(name, page)| (Path::new(name), Content::Bytes(page))).collect();
+                output::write_folder(&folder, &files)?;
+                output::say(&format!("the pages are in {}", folder.display()));
+                Ok(Outcome::Done)
+            }
         }
     }
 }
 
-/// Print completions of command lines for a shell
-#[derive(Clone, Debug, clap::Args)]
-pub struct CompletionsArgs {
-    /// The shell
-    shell: Shell,
-}
-
-impl CompletionsArgs {
-    pub fn run(self) -> Result<Outcome, Failure> {
-        let mut text = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), NAME, &mut text);
-        output::plain(text)
-    }
-}
-
-/// Write manual pages into a folder, one per command
-#[derive(Clone, Debug, clap::Args)]
-pub struct ManArgs {
-    /// The folder; it is created if it does not exist
-    folder: PathBuf,
-}
-
-impl ManArgs {
-    pub fn run(self) -> Result<Outcome, Failure> {
-        let mut command = help::with_examples_alone(Cli::command());
-        command.build();
-        let mut made = Vec::new();
-        pages(&command, &mut made)?;
-        let files: Vec<_> = made.iter().map(|(name, page)| (Path::new(name), Content::Bytes(page))).collect();
-        output::write_folder(&self.folder, &files)?;
-        output::say(&format!("the pages are in {}", self.folder.display()));
-        Ok(Outcome::Done)
-    }
-}
-
-fn pages(command: &clap::Command, made: &mut Vec<(String, Vec<u8>)>) -> Result<(), Failure> {
+fn pages(command: &Command, made: &mut Vec<(String, Vec<u8>)>) -> Result<(), Failure> {
     let name = command.get_display_name().unwrap_or_else(|| command.get_name()).to_owned();
     let mut page = Vec::new();
     clap_mangen::Man::new(command.clone()).date("").render(&mut page)?;

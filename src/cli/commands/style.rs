@@ -9,7 +9,6 @@ use mirrorstats_exact::suggest::hint;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_report::style::{Style, built_in, built_in_names};
 use mirrorstats_score::vocabulary::schema_columns;
-use mirrorstats_study::StudyError;
 
 /// Show and check styles: how tables look
 #[derive(Clone, Debug, clap::Args)]
@@ -57,9 +56,9 @@ fn show(name: &str) -> Result<Outcome, Failure> {
 }
 
 fn check(file: &Path, definitions: &Path) -> Result<Outcome, Failure> {
-    let style = Style::load(file).map_err(StudyError::from)?;
-    let catalog = Definitions::load(definitions, &schema_columns()).map_err(StudyError::from)?.catalog;
-    style.check_against(&catalog).map_err(StudyError::from)?;
+    let style = Style::load(file)?;
+    let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
+    style.check_against(&catalog)?;
     let mut out = io::stdout().lock();
     writeln!(out, "{}: no fault", visible(&file.display().to_string()))?;
     for (name, table) in &style.sheet.table {

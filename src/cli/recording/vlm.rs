@@ -12,7 +12,7 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::episodes::model_id::OWN_SERVER;
 use mirrorstats_world::agent::vlm::Vlm;
 use mirrorstats_world::agent::vlm::limits::{Account, Limits, Spend};
-use mirrorstats_world::agent::vlm::models::{Choice, Models, ModelsError};
+use mirrorstats_world::agent::vlm::models::{Choice, Models};
 use mirrorstats_world::agent::vlm::probe::{ProbeAnswer, probe};
 use mirrorstats_world::agent::vlm::provider::{Patience, Provider, check_transport};
 use mirrorstats_world::agent::vlm::secrets::Secret;
@@ -111,7 +111,7 @@ impl VlmArgs {
         // A router reports the cost of an answer; for others it is unknown without prices.
         let may_say = choice.backend.dialect == Dialect::OpenaiCompatible && choice.model.backend != OWN_SERVER;
         if self.max_cost.is_some() && !may_say {
-            choice.check_prices().map_err(Failure::input)?;
+            choice.check_prices()?;
         }
         let network = network()?;
         let provider = self.provider(&choice, in_flight.map_or(IN_FLIGHT, NonZeroUsize::get))?;
@@ -125,7 +125,7 @@ impl VlmArgs {
             journals,
             Arc::new(Account::new(limits, Spend::default())),
         );
-        vlm.count_spent(&slug).map_err(Failure::input)?;
+        vlm.count_spent(&slug)?;
         Ok(VlmPlayer { vlm: Arc::new(vlm), in_flight: IN_FLIGHT, network: Some(network) })
     }
 
@@ -151,12 +151,9 @@ impl VlmArgs {
         let Some(name) = self.name() else {
             return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
         };
-        let models = Models::load(self.models.as_deref()).map_err(|error| match error {
-            ModelsError::Faults(faults) => Failure::Faults(faults),
-            error => Failure::input(error),
-        })?;
+        let models = Models::load(self.models.as_deref())?;
         let backend = self.backend.as_deref().or(self.base_url.is_some().then_some(OWN_SERVER));
-        let mut choice = models.choose(name, backend).map_err(Failure::input)?;
+        let mut choice = models.choose(name, backend)?;
         if !choice.is_known && choice.model.backend != OWN_SERVER {
             output::say(&format!(
                 "warning: no file of models has `{}`: its prices are not known, and it is asked with the temperature of the paper; \
@@ -168,7 +165,7 @@ impl VlmArgs {
             choice.backend.base_url = Some(url.clone());
         }
         if self.tier.is_some() {
-            choice.use_flex_tier().map_err(Failure::input)?;
+            choice.use_flex_tier()?;
         }
         choice.model.accepted.clone_from(&self.accept_model);
         choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
@@ -188,7 +185,7 @@ impl VlmArgs {
             (Err(missing), _) => return Err(Failure::input(missing)),
         };
         if secret.is_some() {
-            check_transport(url, &choice.backend).map_err(Failure::input)?;
+            check_transport(url, &choice.backend)?;
         }
         let patience = Patience {
             attempts: self.attempts,

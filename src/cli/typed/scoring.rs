@@ -56,18 +56,6 @@ impl ScoringArgs {
     }
 }
 
-impl From<StudyError> for Failure {
-    fn from(error: StudyError) -> Self {
-        match error.into_io() {
-            Ok(error) => Self::Output(error),
-            Err(error) => match error.faults() {
-                Some(faults) => Self::Faults(faults.clone()),
-                None => Self::input(error),
-            },
-        }
-    }
-}
-
 pub(crate) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
     let Failure::Input(error) = &failure else { return failure };
     let Some(StudyError::DefinitionsDiffer { groups }) = error.downcast_ref() else { return failure };

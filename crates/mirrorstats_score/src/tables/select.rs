@@ -24,7 +24,7 @@ use mirrorstats_trace::episodes::labels;
 pub enum SelectError {
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    #[error(transparent)]
+    #[error("{0}")]
     Condition(#[from] Faults),
     #[error(transparent)]
     Engine(#[from] EngineError),

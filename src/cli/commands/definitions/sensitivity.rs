@@ -60,7 +60,7 @@ fn write(out: &Path, report: &SensitivityReport) -> Result<(), Failure> {
     let found = &report.found;
     let mut contents = vec![found.csv().into_bytes(), found.markdown().into_bytes(), found.latex().into_bytes()];
     for format in FigureFormat::ALL {
-        contents.push(format.encode(&report.figure).map_err(Failure::input)?);
+        contents.push(format.encode(&report.figure)?);
     }
     let names: Vec<PathBuf> = names().collect();
     let files: Vec<_> =

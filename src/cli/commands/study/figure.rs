@@ -44,7 +44,7 @@ pub struct FigureArgs {
 impl FigureArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         // Refuse an unknown extension before a pass over the traces.
-        let format = self.output.as_deref().map_or(Ok(FigureFormat::Svg), FigureFormat::of).map_err(Failure::input)?;
+        let format = self.output.as_deref().map_or(Ok(FigureFormat::Svg), FigureFormat::of)?;
         let grouping = GroupingArgs { pool: self.pool, ..GroupingArgs::default() };
         let study = self.traces.study(&self.scoring, &grouping)?;
         if let Some(path) = &self.output {
@@ -56,7 +56,7 @@ impl FigureArgs {
         if top.is_none() && figure.models() > MANY_MODELS {
             output::say(&format!("note: {} models in one figure; --top 12 draws the best 12", figure.models()));
         }
-        let bytes = format.encode(&figure).map_err(Failure::input)?;
+        let bytes = format.encode(&figure)?;
         match &self.output {
             Some(path) => output::write_file(path, &bytes).map(|()| Outcome::Done),
             None => output::plain(bytes),

@@ -16,7 +16,6 @@ use mirrorstats_report::plan::register::{NamedHash, RegisteredPlan};
 use mirrorstats_report::plan::{Given, Plan, PlanRequest, plan};
 use mirrorstats_score::vocabulary::schema_columns;
 use mirrorstats_statistics::sample_size::Clusters;
-use mirrorstats_study::StudyError;
 
 /// Plan how many episodes a study needs: for a wanted difference, or the difference that given episodes can show
 #[derive(Clone, Debug, clap::Args)]
@@ -91,7 +90,7 @@ pub struct PlanArgs {
 
 impl PlanArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        let plan = plan(self.request()).map_err(Failure::input)?;
+        let plan = plan(self.request())?;
         if let Some(file) = &self.register {
             self.write(file, &plan)?;
         }
@@ -118,7 +117,7 @@ impl PlanArgs {
     }
 
     fn write(&self, file: &Path, plan: &Plan) -> Result<(), Failure> {
-        let catalog = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?.catalog;
+        let catalog = Definitions::load(&self.definitions, &schema_columns())?.catalog;
         if file.exists() {
             return Err(registered_before(file));
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
-use mirrorstats_report::errata::{Errata, ErrataError};
+use mirrorstats_report::errata::Errata;
 use mirrorstats_study::published::compare;
 
 /// The style that printed the published tables.
@@ -48,10 +48,7 @@ impl CompareArgs {
 
     fn errata(&self) -> Result<Errata, Failure> {
         match &self.errata {
-            Some(path) => Errata::read(path).map_err(|error| match error {
-                ErrataError::Faults(faults) => Failure::Faults(faults),
-                error @ ErrataError::Unreadable { .. } => Failure::input(error),
-            }),
+            Some(path) => Ok(Errata::read(path)?),
             None if self.style == Path::new(PAPER_STYLE) => Ok(Errata::of_paper()),
             None => Ok(Errata::default()),
         }

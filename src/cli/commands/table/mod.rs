@@ -45,7 +45,7 @@ pub struct VerifyArgs {
 
 impl VerifyArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let found = verify(&self.report).map_err(Failure::input)?;
+        let found = verify(&self.report)?;
         output::print(&found, self.json)?;
         Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

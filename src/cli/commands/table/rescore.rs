@@ -174,7 +174,7 @@ fn reparse(traces: &[Input], out: &Path) -> Result<Reread, Failure> {
     output::make_folder(folder_of(&folder))?;
     let stage = TemporaryFolder::create(folder_of(&folder), "traces")
         .map_err(|error| output::unwritable(folder_of(&folder), error))?;
-    let (answer, traces) = ReparseAnswer::of(traces, stage.path(), &folder).map_err(Failure::input)?;
+    let (answer, traces) = ReparseAnswer::of(traces, stage.path(), &folder)?;
     Ok(Reread { _stage: stage, folder, answer, traces })
 }
 

@@ -61,7 +61,7 @@ pub enum ClusterArg {
 impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         self.check_places()?;
-        let mut mapping = Mapping::parse(&self.map, &self.set).map_err(Failure::input)?;
+        let mut mapping = Mapping::parse(&self.map, &self.set)?;
         let texts = self.steps.iter().map(|path| text(path, self.from, &mut mapping)).collect::<Result<Vec<_>, _>>()?;
         output::notes(&mapping.left_out());
         let request = ImportRequest {
@@ -79,14 +79,14 @@ impl ImportArgs {
             let words = "error: `-`: expected standard input once, found it twice\n  help: name it once";
             return Err(Failure::Rendered(words.to_owned()));
         }
-        replace::check_target(&self.out, &self.steps, "the steps themselves").map_err(Failure::input)?;
+        replace::check_target(&self.out, &self.steps, "the steps themselves")?;
         output::check_target(&self.out, [&self.definitions].into_iter().chain(&self.palette))
     }
 }
 
 fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text, Failure> {
     if matches!(from, None | Some(Format::LeRobot))
-        && let Some(text) = Text::of_data_set(path, mapping).map_err(Failure::input)?
+        && let Some(text) = Text::of_data_set(path, mapping)?
     {
         return Ok(text);
     }

@@ -46,7 +46,7 @@ impl InfoCommand {
         let study = self.input.open()?;
         let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
         output::notes(&by_others(study.traces()?.files()));
-        let info = info(study.traces()?, listing, self.input.threads.count()).map_err(Failure::input)?;
+        let info = info(study.traces()?, listing, self.input.threads.count())?;
         if let Some(episodes) = info.episode_list.as_ref().filter(|_| !self.json) {
             write!(io::stdout().lock(), "{}", list_of(episodes).within(terminal::width()))?;
             return Ok(Outcome::Done);

@@ -53,10 +53,10 @@ pub struct RecoverAnswer {
 impl RecoverArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         output::check_target(&self.out, [&self.log])?;
-        let recovered = recover(&self.log).map_err(Failure::input)?;
+        let recovered = recover(&self.log)?;
         let columns = recovered.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
         let rows = recovered.episodes.iter().map(|episode| merge::rows(episode, &columns));
-        let rows = rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+        let rows = rows.collect::<Result<Vec<_>, _>>()?;
         self.check_target(&rows, recovered.recording.as_ref())?;
         let answer = RecoverAnswer {
             episodes: rows.len(),
@@ -65,7 +65,7 @@ impl RecoverArgs {
             losses: recovered.losses,
         };
         if answer.written {
-            merge::write(&self.out, recovered.recording.as_ref(), &rows).map_err(Failure::input)?;
+            merge::write(&self.out, recovered.recording.as_ref(), &rows)?;
             self.check()?;
         }
         output::print(&answer, self.json)?;
@@ -109,7 +109,7 @@ impl RecoverArgs {
     }
 
     fn check(&self) -> Result<(), Failure> {
-        let report = validate(&[self.target()], None, NonZeroUsize::MIN).map_err(Failure::input)?;
+        let report = validate(&[self.target()], None, NonZeroUsize::MIN)?;
         match report.findings.iter().find(|finding| finding.severity == Severity::Error) {
             None => Ok(()),
             Some(finding) => Err(Failure::input(format!("the recovered trace breaks a rule: {finding}"))),

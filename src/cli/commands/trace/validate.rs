@@ -29,7 +29,7 @@ pub struct ValidateCommand {
 
 impl ValidateCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
+        let inputs = inputs::resolve(&self.input.traces, io::stdin())?;
         let report = findings(self.definitions.as_deref(), &inputs, self.input.threads.count())?;
         let files: Vec<_> = inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect();
         output::notes(&by_others(&files));

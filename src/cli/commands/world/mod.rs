@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use crate::cli::output;
 use crate::cli::{Failure, Outcome, experiments};
 use mirrorstats_world::record::plan::Experiments;
-use mirrorstats_world::sim::config::{ConfigError, WorldConfig};
+use mirrorstats_world::sim::config::WorldConfig;
 #[cfg(feature = "raster")]
 use mirrorstats_world::sim::contact_sheet;
 use mirrorstats_world::sim::scene::Scene;
@@ -75,10 +75,7 @@ struct SheetArgs {
 /// The world configuration in a file, or the built-in one.
 pub(super) fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
     let Some(path) = path else { return Ok(WorldConfig::default()) };
-    WorldConfig::load(path).map_err(|error| match error {
-        ConfigError::Faults(faults) => Failure::Faults(faults),
-        unreadable @ ConfigError::Unreadable { .. } => Failure::input(unreadable),
-    })
+    Ok(WorldConfig::load(path)?)
 }
 
 impl WorldArgs {
@@ -90,7 +87,7 @@ impl WorldArgs {
             WorldVerb::Scene(args) => {
                 let config = configured(args.config.as_ref())?;
                 for experiment in experiments::asked(&args.experiments, &config)? {
-                    let scene = Scene::draw(&config, experiment, args.seed, args.run).map_err(Failure::input)?;
+                    let scene = Scene::draw(&config, experiment, args.seed, args.run)?;
                     writeln!(io::stdout().lock(), "{:#}", serde_json::json!(scene))?;
                 }
             }
@@ -100,7 +97,7 @@ impl WorldArgs {
                 let target = args.out.join("sheet.png");
                 output::check_target(&target, &args.config)?;
                 let experiments = experiments::asked(&args.experiment, &config)?;
-                let png = contact_sheet::png(&config, &experiments, args.seed).map_err(Failure::input)?;
+                let png = contact_sheet::png(&config, &experiments, args.seed)?;
                 output::make_folder(&args.out)?;
                 output::write_file(&target, &png)?;
             }

@@ -275,7 +275,7 @@ impl RecordArgs {
             )));
         }
         let plan = Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard };
-        MOST_EPISODES.check(plan.size()).map_err(Failure::input)?;
+        MOST_EPISODES.check(plan.size())?;
         #[cfg(feature = "view")]
         if self.agent == HUMAN {
             return self.human.spread(plan);
@@ -287,7 +287,7 @@ impl RecordArgs {
     fn forecast(&self, all: &Budget) -> Result<ForecastAnswer, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
-        all.spend(plan.size()).map_err(Failure::input)?;
+        all.spend(plan.size())?;
         let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
         let player = match &vlm {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
@@ -307,7 +307,7 @@ impl RecordArgs {
 
     /// Locks the folder for this process, before a player reads or writes there.
     pub fn lock(&self) -> Result<FolderLock, Failure> {
-        FolderLock::take(&self.out).map_err(Failure::input)
+        Ok(FolderLock::take(&self.out)?)
     }
 
     /// Records with this player, whatever `--agent` names, until the end or until `stop` is set. Reports only progress.
@@ -337,15 +337,15 @@ impl RecordArgs {
         let deleted = player.deleted();
         bar.clear();
         player.ended(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
-        let tally = outcome.map_err(Failure::input)?;
-        assembled.map_err(Failure::input)?;
+        let tally = outcome?;
+        assembled?;
         let deleted = deleted.map_err(Failure::input)?;
         let stays = |key: &Key| !deleted.contains(&key.episode_id(subject));
         let found: Vec<Key> = episodes.found().into_iter().filter(stays).collect();
         let Tally { recorded, lost, under_way, by_limit, left_out, steps, stopped, given_up } = tally;
         let recorded: Vec<Key> = recorded.into_iter().filter(stays).collect();
         let lost: Vec<LostEpisode> = lost.into_iter().map(|(_, lost)| lost).collect();
-        store.note_lost(&[found.as_slice(), &recorded].concat(), &lost).map_err(Failure::input)?;
+        store.note_lost(&[found.as_slice(), &recorded].concat(), &lost)?;
         let answer = RecordAnswer {
             model: player.model().to_owned(),
             asked: planned.len(),
@@ -358,7 +358,7 @@ impl RecordArgs {
             stopped_by_limit: if by_limit { under_way.len() } else { 0 },
             spend: player.spend(),
             stopped,
-            renderers: store.renderers(&plan.experiments).map_err(Failure::input)?,
+            renderers: store.renderers(&plan.experiments)?,
             traces: files(plan, |experiment| store.trace(experiment)),
             logs: files(plan, |experiment| store.log(experiment)),
         };

@@ -44,7 +44,7 @@ pub struct ReplayArgs {
 
 impl ReplayArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let files = inputs::resolve(&self.traces, io::stdin()).map_err(Failure::input)?;
+        let files = inputs::resolve(&self.traces, io::stdin())?;
         output::note_stale_checksums(&files);
         let traces = RecordedTrace::open(&files, self.episode.as_deref())?;
         if traces.len() > 1 && self.mcap.is_some() {
@@ -110,12 +110,6 @@ impl ReplayArgs {
             "error: `{}`: expected no file, or a log of the episode `{id}` alone, found {found}\n  help: give --mcap another name, or leave out --episode to replace the whole log",
             path.display()
         )))
-    }
-}
-
-impl From<ReplayError> for Failure {
-    fn from(error: ReplayError) -> Self {
-        Self::input(error)
     }
 }
 

@@ -21,12 +21,6 @@ use mirrorstats_world::agent::{Agent, Lost, Player, Task};
 use mirrorstats_world::experiment::Spec;
 use mirrorstats_world::record::plan::slug;
 
-/// A service tier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Tier {
-    Flex,
-}
-
 /// A model, who serves it, and what a recording with it may spend.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent vlm")]
@@ -73,8 +67,8 @@ pub struct VlmArgs {
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
     /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes
-    #[arg(long, value_name = "flex", value_enum)]
-    tier: Option<Tier>,
+    #[arg(long, value_name = "flex", value_parser = ["flex"])]
+    tier: Option<String>,
     /// Seconds for one answer [default: 180, or 900 with --tier flex]
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=3_600))]
     timeout: Option<u64>,

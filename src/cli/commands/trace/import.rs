@@ -35,8 +35,8 @@ pub struct ImportArgs {
     palette: Option<PathBuf>,
     /// What similar episodes share: statistics treat it as a cluster. Episodes with an equal `scene` are pairs by
     /// default
-    #[arg(long, value_enum, value_name = "COLUMN")]
-    cluster: Option<ClusterArg>,
+    #[arg(long, value_name = "COLUMN", value_parser = ["seed"])]
+    cluster: Option<String>,
     /// The steps are rebuilt from published numbers, so statistics use no pairs and no clusters
     #[arg(long, conflicts_with = "cluster")]
     reconstruction: bool,
@@ -50,12 +50,6 @@ pub struct ImportArgs {
     /// Answer as JSON
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ClusterArg {
-    /// The episodes of one seed
-    Seed,
 }
 
 impl ImportArgs {

@@ -64,19 +64,19 @@ fn long_version() -> String {
 
 /// Runs the program with these arguments, which start with the program's name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let _ = told_of_large_files();
+    let _ = fail_at_file_size_limit();
     ExitCode::from(run_to_code(arguments))
 }
 
 /// Makes a write beyond the file size limit fail with an error, instead of ending the process.
 #[cfg(unix)]
-fn told_of_large_files() -> io::Result<()> {
+fn fail_at_file_size_limit() -> io::Result<()> {
     use signal_hook::consts::SIGXFSZ;
     signal_hook::flag::register(SIGXFSZ, std::sync::Arc::default()).map(drop)
 }
 
 #[cfg(not(unix))]
-fn told_of_large_files() -> io::Result<()> {
+fn fail_at_file_size_limit() -> io::Result<()> {
     Ok(())
 }
 

@@ -18,20 +18,20 @@ use mirrorstats_trace::read::open::TraceFile;
 
 /// Prints an answer: text for people or JSON for programs.
 pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, Failure> {
-    print_told(answer, json, |text, answer| write!(text, "{answer}"))
+    print_with(answer, json, |text, answer| write!(text, "{answer}"))
 }
 
-/// Prints an answer whose text `tell` writes.
-pub fn print_told<T: Serialize>(
+/// Prints an answer whose text `write` makes.
+pub fn print_with<T: Serialize>(
     answer: &T,
     json: bool,
-    tell: impl FnOnce(&mut String, &T) -> fmt::Result,
+    write: impl FnOnce(&mut String, &T) -> fmt::Result,
 ) -> Result<Outcome, Failure> {
     if json {
         return print_json(answer);
     }
     let mut text = String::new();
-    tell(&mut text, answer)?;
+    write(&mut text, answer)?;
     plain(visible_lines(text.trim_end()) + "\n")
 }
 

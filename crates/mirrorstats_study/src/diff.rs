@@ -204,21 +204,32 @@ impl Side {
         }
     }
 
-    fn bind(
+    /// The scores with these metrics, or what computes them.
+    fn half<'t>(
         &self,
+        table: Option<EpisodeTable>,
         common: &[String],
-        traces: Option<&TraceSet>,
+        traces: Option<&'t TraceSet>,
         request: &DiffRequest,
-    ) -> Result<Option<Definitions>, StudyError> {
-        match (self, traces) {
-            (Self::Scores(_), _) => Ok(None),
-            (Self::Definitions(name), None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
-            (Self::Definitions(_), Some(traces)) => {
-                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
-                question.bind(traces).map(Some)
+    ) -> Result<Half<'t>, StudyError> {
+        match (self, table, traces) {
+            (_, Some(mut table), _) => {
+                table.metrics.retain(|metric| common.contains(&metric.name));
+                Ok(Half::Scores(Box::new(table)))
             }
+            (_, None, Some(traces)) => {
+                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
+                Ok(Half::Definitions(Box::new(question.bind(traces)?), traces))
+            }
+            (Self::Definitions(name), None, None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
+            (Self::Scores(_), None, None) => Err(StudyError::NoScores),
         }
     }
+}
+
+enum Half<'t> {
+    Scores(Box<EpisodeTable>),
+    Definitions(Box<Definitions>, &'t TraceSet),
 }
 
 impl Pair {
@@ -230,20 +241,28 @@ impl Pair {
         let [before, after] =
             [old_metrics, new_metrics].map(|names| names.into_iter().filter(wanted).collect::<Vec<String>>());
         let common: Vec<String> = after.iter().filter(|name| before.contains(name)).cloned().collect();
-        let of_common = |table: Option<EpisodeTable>| {
-            table.map(|mut table| {
-                table.metrics.retain(|metric| common.contains(&metric.name));
-                table
-            })
+        let halves = [old.half(old_table, &common, traces, request)?, new.half(new_table, &common, traces, request)?];
+        let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
+        let score = |half| match half {
+            Half::Scores(table) => Ok((*table, None)),
+            Half::Definitions(definitions, traces) => {
+                let table = score_traces::score(traces, &definitions, &labels, request.threads)?;
+                Ok::<_, StudyError>((table, Some(*definitions)))
+            }
         };
-        let definitions = [old.bind(&common, traces, request)?, new.bind(&common, traces, request)?];
-        let (tables, evidence) =
-            score_sides(&definitions, [of_common(old_table), of_common(new_table)], traces, request)?;
-        let ([old_definitions, new_definitions], [old_table, new_table]) = (definitions, tables);
+        let ([(old, old_definitions), (new, new_definitions)], evidence) = match halves {
+            // One scan scores both.
+            [Half::Definitions(old, traces), Half::Definitions(new, _)] => {
+                let flips::ScoredPair { tables: [before, after], evidence } =
+                    flips::score_pair(traces, [&old, &new], &labels, request.threads)?;
+                ([(before, Some(*old)), (after, Some(*new))], Some(evidence))
+            }
+            [old, new] => ([score(old)?, score(new)?], None),
+        };
         Ok(Self {
             evidence,
-            before: Scored { table: old_table, metrics: before, definitions: old_definitions },
-            after: Scored { table: new_table, metrics: after, definitions: new_definitions },
+            before: Scored { table: old, metrics: before, definitions: old_definitions },
+            after: Scored { table: new, metrics: after, definitions: new_definitions },
         })
     }
 
@@ -315,28 +334,6 @@ impl Scored {
                 Ok(definitions)
             }
         }
-    }
-}
-
-type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
-
-fn score_sides(
-    definitions: &[Option<Definitions>; 2],
-    read: [Option<EpisodeTable>; 2],
-    traces: Option<&TraceSet>,
-    request: &DiffRequest,
-) -> Result<ScoredSides, StudyError> {
-    let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
-    let score = |traces, definitions| score_traces::score(traces, definitions, &labels, request.threads);
-    match (definitions, read, traces) {
-        ([None, None], [Some(old), Some(new)], _) => Ok(([old, new], None)),
-        ([Some(old), Some(new)], _, Some(traces)) => {
-            let pair = flips::score_pair(traces, [old, new], &labels, request.threads)?;
-            Ok((pair.tables, Some(pair.evidence)))
-        }
-        ([Some(old), None], [_, Some(new)], Some(traces)) => Ok(([score(traces, old)?, new], None)),
-        ([None, Some(new)], [Some(old), _], Some(traces)) => Ok(([old, score(traces, new)?], None)),
-        _ => Err(StudyError::NoScores),
     }
 }
 

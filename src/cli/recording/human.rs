@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::cli::args::one_of;
 use crate::cli::{Failure, output};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::input;
@@ -34,11 +35,11 @@ pub struct HumanArgs {
     participants: Vec<String>,
     /// Who plays what: split, each episode is played by one participant; crossed, everyone plays every scene; own-seeds,
     /// everyone plays --seeds seeds of their own
-    #[arg(long, value_name = "DESIGN", default_value = "split", value_parser = design)]
+    #[arg(long, value_name = "DESIGN", default_value = "split", hide_possible_values = true, value_parser = one_of(&Design::ALL, Design::name))]
     design: Design,
     /// In which order: planned, by experiment, seed and run; counterbalanced, by the rows of a Latin square [default:
     /// counterbalanced if crossed, else planned]
-    #[arg(long, value_name = "ORDER", value_parser = order)]
+    #[arg(long, value_name = "ORDER", hide_possible_values = true, value_parser = one_of(&Order::ALL, Order::name))]
     order: Option<Order>,
     /// A text that participants agree to before they begin
     #[arg(long, value_name = "FILE")]
@@ -152,14 +153,6 @@ fn enrol(journal: &ParticipantJournal, code: &str, place: usize) -> io::Result<S
     let token = mirrorstats_web::new_token()?;
     journal.enrol(code, place, &token)?;
     Ok(token)
-}
-
-fn design(text: &str) -> Result<Design, String> {
-    Design::named(text).ok_or_else(|| format!("expected {}", Design::ALL.map(Design::name).join(", ")))
-}
-
-fn order(text: &str) -> Result<Order, String> {
-    Order::named(text).ok_or_else(|| format!("expected {}", Order::ALL.map(Order::name).join(" or ")))
 }
 
 /// Parses a code, which is not a name: letters, digits, `-` and `_`.

@@ -4,6 +4,8 @@ use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
 /// The traces to read.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TraceArgs {
@@ -64,6 +66,16 @@ pub enum LostArg {
     Excluded,
     /// Count them as failures in each rate that every episode has
     AsFailure,
+}
+
+/// Parses the name of one of some values.
+pub fn one_of<T: Copy + Send + Sync + 'static>(
+    all: &'static [T],
+    name: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.iter().map(|value| name(*value))).map(move |typed: String| {
+        *all.iter().find(|value| name(**value) == typed).expect("only these names are possible")
+    })
 }
 
 /// Parses a number of an option.

@@ -88,26 +88,23 @@ impl StatsArgs {
         all: impl Iterator<Item = &'a str>,
         headline: &[String],
     ) -> Result<Vec<String>, Failure> {
+        if self.metrics.is_empty() {
+            return Ok(headline.to_vec());
+        }
         let mut known: Vec<&str> = Vec::new();
         for metric in all {
             if !known.contains(&metric) {
                 known.push(metric);
             }
         }
-        if self.metrics.is_empty() {
-            return Ok(headline.to_vec());
-        }
         if self.metrics.iter().any(|name| name == ALL) {
             return Ok(known.into_iter().map(str::to_owned).collect());
         }
-        match self.metrics.iter().find(|name| !known.contains(&name.as_str())) {
-            None => Ok(self.metrics.clone()),
-            Some(name) => {
-                let (known, suggestion) = (known.join(", "), hint(name, known.iter().copied()));
-                let words = format!("no {kind} is named `{name}`; the definitions have {known}{suggestion}");
-                Err(Failure::input(words))
-            }
-        }
+        let Some(name) = self.metrics.iter().find(|name| !known.contains(&name.as_str())) else {
+            return Ok(self.metrics.clone());
+        };
+        let (suggestion, known) = (hint(name, known.iter().copied()), known.join(", "));
+        Err(Failure::input(format!("no {kind} is named `{name}`; the definitions have {known}{suggestion}")))
     }
 }
 

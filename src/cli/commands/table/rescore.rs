@@ -79,12 +79,13 @@ pub struct RescoreAnswer {
 impl RescoreArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let out = folder_of_rescored(&self.report, self.out.as_deref())?;
-        let mut traces = traces_of(&self.report, &self.traces)?;
+        let traces = traces_of(&self.report, &self.traces)?;
         let reread = self.reparse.then(|| reparse(&traces, &out)).transpose()?;
-        if let Some(reread) = &reread {
-            traces.clone_from(&reread.traces);
-        }
-        let rescored = self.request(&out, traces).run()?;
+        let traces = reread.as_ref().map_or(traces, |reread| reread.traces.clone());
+        let Self { report, definitions, style, metrics, .. } = self.clone();
+        let threads = self.threads.count();
+        let rescored =
+            RescoreRequest { report, definitions, traces, out: out.clone(), style, metrics, threads }.run()?;
         output::notes(&rescored.report.notes);
         let written = rescored.report.write(&out)?;
         // A kill between the two leaves a report without its traces, which the same command makes again.
@@ -94,18 +95,6 @@ impl RescoreArgs {
             Err(reason) => output::note(&format!("no comparison with the old report: {reason}")),
         }
         self.print(&out, written, rescored, reparsed)
-    }
-
-    fn request(&self, out: &Path, traces: Vec<Input>) -> RescoreRequest {
-        RescoreRequest {
-            report: self.report.clone(),
-            out: out.to_owned(),
-            definitions: self.definitions.clone(),
-            traces,
-            style: self.style.clone(),
-            metrics: self.metrics.clone(),
-            threads: self.threads.count(),
-        }
     }
 
     fn print(
@@ -123,7 +112,7 @@ impl RescoreArgs {
             return output::print_json(&RescoreAnswer { out, files, episodes, manifest, reparsed, changes });
         }
         if let Some(reparsed) = &reparsed {
-            tell_reparsed(&mut io::stdout().lock(), reparsed, self.limit)?;
+            write_reparsed(&mut io::stdout().lock(), reparsed, self.limit)?;
         }
         if let Some(changes) = &changes {
             io::stdout().lock().write_all(changes.render(Limit(self.limit), terminal::width()).as_bytes())?;
@@ -159,11 +148,8 @@ fn reparse(traces: &[Input], out: &Path) -> Result<Reread, Failure> {
         let target = folder.join(trace.path.file_name().unwrap_or_default());
         output::check_target(&target, [&trace.path])?;
         if let Some(other) = traces[..at].iter().find(|other| other.path.file_name() == trace.path.file_name()) {
-            return Err(Failure::input(format!(
-                "`{}` and `{}` have one name",
-                visible(&other.name),
-                visible(&trace.name)
-            )));
+            let (one, other) = (visible(&other.name), visible(&trace.name));
+            return Err(Failure::input(format!("`{one}` and `{other}` have one name")));
         }
     }
     if out.exists() != folder.exists() {
@@ -178,7 +164,7 @@ fn reparse(traces: &[Input], out: &Path) -> Result<Reread, Failure> {
     Ok(Reread { _stage: stage, folder, answer, traces })
 }
 
-fn tell_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize) -> io::Result<()> {
+fn write_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize) -> io::Result<()> {
     let mut table =
         Table { names: 2, ..Table::of_texts(["episode", "t", "column", "before", "after"]).aligned_right([1]) };
     let name = |value: &Option<String>| visible(value.as_deref().unwrap_or("--"));

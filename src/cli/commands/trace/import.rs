@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::cli::args::one_of;
 use crate::cli::{Failure, Outcome, output};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use mirrorstats_exact::replace;
 use mirrorstats_study::import::{ImportRequest, import};
 use mirrorstats_trace::import::{Format, Mapping, Text};
@@ -21,7 +21,7 @@ pub struct ImportArgs {
     #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
     /// The format of the files [default: detected from names and first bytes]
-    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(&Format::ALL, Format::name))]
     from: Option<Format>,
     /// The trace to write
     #[arg(short, long, value_name = "TRACE.parquet")]
@@ -90,11 +90,6 @@ fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text
         text.mapped(format, mapping)
     });
     mapped.map_err(Failure::input)
-}
-
-fn formats() -> impl TypedValueParser<Value = Format> {
-    let names = PossibleValuesParser::new(Format::ALL.map(Format::name));
-    names.map(|name| Format::named(&name).expect("it is one of the names"))
 }
 
 fn is_standard_input(path: &Path) -> bool {

@@ -76,29 +76,25 @@ impl RecoverArgs {
     fn check_target(&self, rows: &[EpisodeRows], recording: Option<&Value>) -> Result<(), Failure> {
         // A file that is not a readable trace may be replaced.
         let (Ok(file), Ok(there)) = (TraceFile::open(&self.target()), merge::read(&self.out)) else { return Ok(()) };
-        let help = "name another file, or move that one away";
+        let (out, log) = (self.out.display(), self.log.display());
+        let refused =
+            |why: String| Err(Failure::input(format!("{why}\n  help: name another file, or move that one away")));
         let ids: BTreeSet<&str> = rows.iter().map(|episode| episode.episode_id.as_str()).collect();
         if let Some(missing) = there.iter().find(|episode| !ids.contains(episode.episode_id.as_str())) {
-            let (out, id) = (self.out.display(), &missing.episode_id);
-            return Err(Failure::input(format!(
-                "`{out}` has the episode `{id}`, which cannot be recovered from the log\n  help: {help}"
-            )));
+            let id = &missing.episode_id;
+            return refused(format!("`{out}` has the episode `{id}`, which cannot be recovered from the log"));
         }
         if without_seeds(Some(&file.recording())) != without_seeds(recording) {
-            let out = self.out.display();
-            return Err(Failure::input(format!(
-                "`{out}` is a trace of another recording than the log\n  help: {help}"
-            )));
+            return refused(format!("`{out}` is a trace of another recording than the log"));
         }
         let hashes: BTreeMap<_, _> = rows.iter().map(|episode| (&episode.episode_id, episode.stated_hash())).collect();
         for episode in &there {
-            let logged = hashes.get(&episode.episode_id).cloned().flatten();
+            let (id, logged) = (&episode.episode_id, hashes.get(&episode.episode_id).cloned().flatten());
             if let Some((traced, logged)) = episode.stated_hash().zip(logged).filter(|(a, b)| a != b) {
-                let (out, log, id) = (self.out.display(), self.log.display(), &episode.episode_id);
-                return Err(Failure::input(format!(
+                return refused(format!(
                     "`{out}` and `{log}` do not belong together: expected rows of the episode `{id}` with the hash {traced}, \
-                     as in the trace, found {logged}\n  help: {help}"
-                )));
+                     as in the trace, found {logged}"
+                ));
             }
         }
         Ok(())

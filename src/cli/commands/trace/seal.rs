@@ -35,11 +35,11 @@ impl SealArgs {
             SealError::Unwritable { path, source } => output::unwritable(&path, source),
             other => other.into(),
         })?;
-        output::print_told(&answer, self.json, tell)
+        output::print_with(&answer, self.json, write_answer)
     }
 }
 
-fn tell(text: &mut String, answer: &SealAnswer) -> fmt::Result {
+fn write_answer(text: &mut String, answer: &SealAnswer) -> fmt::Result {
     let SealAnswer { name, out, episodes, steps, sha256, .. } = answer;
     let (episodes, steps) = (counted(*episodes, "episode"), counted(*steps, "step"));
     writeln!(text, "{out}: {name} with checksums, {episodes}, {steps}; sha256 {sha256}")

@@ -139,7 +139,7 @@ impl RecordArgs {
             return self.print_probes(&each);
         }
         if each.len() > 1 {
-            dry_run::tell_all(&mut io::stderr().lock(), &forecasts()?)?;
+            dry_run::write_all(&mut io::stderr().lock(), &forecasts()?)?;
         }
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         let playing = Playing::default();
@@ -192,8 +192,8 @@ impl RecordArgs {
     fn print_forecasts(&self, forecasts: &[ForecastAnswer]) -> Result<Outcome, Failure> {
         match forecasts {
             all if self.json => self.print_list(all).map(|()| Outcome::Done),
-            [one] => Ok(dry_run::tell(&mut io::stdout().lock(), one).map(|()| Outcome::Done)?),
-            all => Ok(dry_run::tell_all(&mut io::stdout().lock(), all).map(|()| Outcome::Done)?),
+            [one] => Ok(dry_run::write_one(&mut io::stdout().lock(), one).map(|()| Outcome::Done)?),
+            all => Ok(dry_run::write_all(&mut io::stdout().lock(), all).map(|()| Outcome::Done)?),
         }
     }
 
@@ -202,7 +202,7 @@ impl RecordArgs {
         for args in each {
             let answer = args.probe()?;
             if !self.json {
-                probe::tell(&mut io::stdout().lock(), &answer)?;
+                probe::write(&mut io::stdout().lock(), &answer)?;
             }
             answers.push(answer);
         }

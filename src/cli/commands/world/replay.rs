@@ -56,7 +56,7 @@ impl ReplayArgs {
         for trace in &traces {
             trace.replay(&self.outputs(), &mut answer, save)?;
         }
-        output::print_told(&answer, self.json, tell)?;
+        output::print_with(&answer, self.json, write_answer)?;
         Ok(if answer.divergences.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
     }
 
@@ -118,7 +118,7 @@ fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
     output::write_file(path, png)
 }
 
-fn tell_frames(text: &mut String, frames: &FramesAnswer) -> fmt::Result {
+fn write_frames(text: &mut String, frames: &FramesAnswer) -> fmt::Result {
     let FramesAnswer { equal, alike, different, tolerance, recorded_with, drawn_with, not_compared } = frames;
     if let Some(reason) = not_compared {
         return writeln!(text, "frames are not compared: {reason}");
@@ -140,7 +140,7 @@ fn tell_frames(text: &mut String, frames: &FramesAnswer) -> fmt::Result {
     Ok(())
 }
 
-fn tell(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
+fn write_answer(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
     for Divergence { episode_id, t, column, expected, found } in &answer.divergences {
         // Hashes are enough for people.
         let [expected, found] = [expected, found].map(|text| match column.as_str() {
@@ -155,5 +155,5 @@ fn tell(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
         1 => writeln!(text, ": 1 of the episodes parts from the trace")?,
         parted => writeln!(text, ": {parted} of the episodes part from the trace")?,
     }
-    answer.frames.as_ref().map_or(Ok(()), |frames| tell_frames(text, frames))
+    answer.frames.as_ref().map_or(Ok(()), |frames| write_frames(text, frames))
 }

@@ -8,13 +8,13 @@
 //! # The main job
 //!
 //! ```
-//! use mirrorstats::{ReportOptions, Study, StudyError};
+//! use mirrorstats::{ReportOptions, Study, StudyError, report};
 //!
 //! # fn main() -> Result<(), StudyError> {
 //! let study = Study::open(["fixtures/paper"])?.definitions("paper")?;
 //! assert_eq!(study.score()?.episodes.len(), 840);
-//! let report = study.report(&ReportOptions { style: "paper".into(), figures: false })?;
-//! assert!(report.markdown("main").is_some_and(|table| table.contains("Claude Sonnet 4.6")));
+//! let report = report(&study, &ReportOptions { style: "paper".into(), figures: false })?;
+//! assert!(report.table("main")?.printed().markdown().contains("Claude Sonnet 4.6"));
 //! # Ok(())
 //! # }
 //! ```
@@ -62,7 +62,7 @@
 //! # let out = folder.path().join("report");
 //! let study = mirrorstats::Study::open(["fixtures/paper"])?.filter("experiment = 'E1'")?;
 //! let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
-//! let files = study.report(&options)?.write(&out)?.files;
+//! let files = mirrorstats::report(&study, &options)?.write(&out)?.files;
 //! assert!(files.contains(&"tables/main.tex".to_owned()));
 //! # Ok(())
 //! # }
@@ -97,8 +97,14 @@ pub use mirrorstats_score::cells::{Cells, Group, KeyValue};
 pub use mirrorstats_score::evidence::Evidence;
 pub use mirrorstats_score::tables::columns::record_batch as episode_batch;
 pub use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
-pub use mirrorstats_study::{
-    Backend, Diff, DiffRequest, FigureOptions, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side,
-    Study, StudyError, diff, resolve,
-};
+pub use mirrorstats_study::diff::{Diff, DiffRequest, Side, diff};
+pub use mirrorstats_study::explain::explain;
+pub use mirrorstats_study::figure::{FigureOptions, figure};
+pub use mirrorstats_study::gate::gate;
+pub use mirrorstats_study::inputs::resolve;
+pub use mirrorstats_study::report::{Report, ReportOptions, report};
+pub use mirrorstats_study::rescore::{RescoreRequest, Rescored};
+pub use mirrorstats_study::results::{Outputs, Results};
+pub use mirrorstats_study::statistics::statistics;
+pub use mirrorstats_study::{Study, StudyError};
 pub use mirrorstats_tables::Table;

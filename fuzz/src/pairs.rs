@@ -8,7 +8,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use mirrorstats_study::{Question, ReportOptions, Study};
+use mirrorstats_study::Study;
+use mirrorstats_study::question::Question;
+use mirrorstats_study::report::{ReportOptions, report};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_view::{Options, View};
 
@@ -168,7 +170,7 @@ pub fn styled(data: &[u8]) {
     let Some(study) = study("styled.csv", scores) else { return };
     reached("open");
     let study = study.threads(NonZeroUsize::MIN).pool();
-    if let Some(report) = bounded(|| study.report(&ReportOptions { style, figures: false }).ok()) {
+    if let Some(report) = bounded(|| report(&study, &ReportOptions { style, figures: false }).ok()) {
         reached("report");
         assert!(!report.tables.is_empty());
     }

@@ -7,8 +7,8 @@
     study.episodes                      # Arrow: polars.DataFrame(study.episodes), pyarrow.table(study.episodes)
 
 Every answer is the one that the command `mirrorstats` gives, in words of arguments. Each kind of error has a class under
-`Error`. Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply, but for
-`MIRRORSTATS_BUDGET`, which allows larger inputs. Work that takes time releases the
+`Error`. Settings of the command line (`mirrorstats.toml`) do not apply.
+`MIRRORSTATS_BUDGET` allows larger inputs. Work that takes time releases the
 interpreter's lock.
 """
 

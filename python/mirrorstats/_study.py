@@ -47,7 +47,7 @@ def open(
         DefinitionError: faults of the definitions or of the condition.
         ArgumentError: no input, a metric that the definitions do not have, a number of threads below 1.
 
-    Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply here, but for `MIRRORSTATS_BUDGET`, which
+    Settings of the command line (`mirrorstats.toml`) do not apply here; `MIRRORSTATS_BUDGET` does, which
     allows larger inputs.
 
     Example:

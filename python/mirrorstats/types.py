@@ -591,7 +591,6 @@ class Played(TypedDict):
     episode_id: str
     value: int
     timesteps: Optional[list[int]]
-    frames: Optional[str]
 
 
 class RankRow(TypedDict):

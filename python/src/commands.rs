@@ -8,7 +8,8 @@ use std::thread::available_parallelism;
 
 use mirrorstats::cli;
 use mirrorstats_import::Text;
-use mirrorstats_study::ImportRequest;
+use mirrorstats_study::findings::{findings, findings_text};
+use mirrorstats_study::import::{ImportRequest, import};
 use mirrorstats_trace::inputs;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -34,9 +35,9 @@ pub fn validate(
     let found = py.detach(|| {
         let inputs = inputs::resolve(&paths, std::io::empty()).map_err(error::of_input)?;
         let threads = threads.or_else(|| available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
-        mirrorstats_study::findings(definitions.as_deref(), &inputs, threads).map_err(error::of_study)
+        findings(definitions.as_deref(), &inputs, threads).map_err(error::of_study)
     })?;
-    answer::of(&found, mirrorstats_study::findings_text(&found))
+    answer::of(&found, findings_text(&found))
 }
 
 /// The import arguments from Python.
@@ -57,7 +58,7 @@ pub fn import_text(py: Python<'_>, name: &str, lines: &[u8], asked: ImportAsked)
     let request = ImportRequest { out, definitions, palette, clusters_by_seed, reconstruction };
     let imported = py.detach(|| {
         let text = Text::spool(name, lines).map_err(error::of_input)?;
-        mirrorstats_study::import(vec![text], &request).map_err(error::of_study)
+        import(vec![text], &request).map_err(error::of_study)
     })?;
     answer::of(&imported, imported.to_string())
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use mirrorstats::StudyError;
 use mirrorstats::cli::{ErrorAnswer, Failure};
 use mirrorstats_import::{Fault, ImportError};
-use mirrorstats_toml_spec::FaultRecord;
+use mirrorstats_toml_spec::{FaultRecord, Faults};
 use mirrorstats_trace::error::TraceError;
 use pyo3::prelude::*;
 
@@ -22,7 +22,7 @@ pub fn of_study(error: StudyError) -> PyErr {
 
 fn kind(error: &StudyError) -> &'static str {
     use StudyError as E;
-    if let Some(faults) = error.faults() {
+    if let Some(faults) = Faults::of(error) {
         let is_query = faults.records().iter().any(|fault| fault.file == "query");
         return if is_query { "QueryError" } else { "DefinitionError" };
     }

@@ -9,7 +9,12 @@ use mirrorstats::{FigureName, FigureOptions, ReportOptions, StatisticsOptions};
 use mirrorstats_analysis::gate::{GateFormat, GateOptions};
 use mirrorstats_analysis::statistics::text::Length;
 use mirrorstats_figures::InvalidWidth;
-use mirrorstats_study::{LostAs, Question};
+use mirrorstats_study::diff::diff_studies;
+use mirrorstats_study::gate::leading_metric;
+use mirrorstats_study::losses::LostAs;
+use mirrorstats_study::query::query_parquet;
+use mirrorstats_study::question::Question;
+use mirrorstats_study::report;
 use pyo3::prelude::*;
 
 use crate::answer::{self, Answer};
@@ -60,7 +65,7 @@ impl Asked {
 
 impl Study {
     fn tables_of(&self, style: String) -> PyResult<mirrorstats::Report> {
-        self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)
+        report::report(&self.inner, &ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)
     }
 }
 
@@ -126,7 +131,7 @@ impl Study {
         let width = width.map(str::parse).transpose();
         let width = width.map_err(|fault: InvalidWidth| error::of_argument(format!("width: {fault}")))?;
         let options = FigureOptions { style: style.into(), metrics, width, top: None };
-        let figure = py.detach(|| self.inner.figure(name, &options).map_err(error::of_study))?;
+        let figure = py.detach(|| mirrorstats::figure(&self.inner, name, &options).map_err(error::of_study))?;
         Ok(Figure::new(figure, name.name()))
     }
 
@@ -134,8 +139,8 @@ impl Study {
         let (written, notes) = py.detach(|| {
             let options = ReportOptions { style: style.into(), figures };
             let out = Path::new(out);
-            self.inner.check_folder(out, &options).map_err(error::of_study)?;
-            let report = self.inner.report(&options).map_err(error::of_study)?;
+            report::check_folder(&self.inner, out, &options).map_err(error::of_study)?;
+            let report = report::report(&self.inner, &options).map_err(error::of_study)?;
             Ok::<_, PyErr>((report.write(out).map_err(error::of_study)?, report.notes))
         })?;
         answer::of(&written.manifest, [written.files, notes].concat().join("\n"))
@@ -144,17 +149,20 @@ impl Study {
     #[pyo3(signature = (confidence, full))]
     fn stats(&self, py: Python<'_>, confidence: f64, full: bool) -> PyResult<Answer> {
         let options = StatisticsOptions { confidence, improvements: true, ..StatisticsOptions::default() };
-        let found = py.detach(|| self.inner.statistics(&options).map_err(error::of_study))?;
+        let found = py.detach(|| {
+            let grouped = self.inner.grouped().map_err(error::of_study)?;
+            mirrorstats::statistics(&grouped, &options).map_err(error::of_study)
+        })?;
         answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Short }, None))
     }
 
     fn query(&self, py: Python<'_>, sql: &str) -> PyResult<Table> {
-        let file = py.detach(|| self.inner.query_parquet(sql).map_err(error::of_study))?;
+        let file = py.detach(|| query_parquet(&self.inner, sql).map_err(error::of_study))?;
         Table::from_parquet(file)
     }
 
     fn diff(&self, py: Python<'_>, other: &Self) -> PyResult<Answer> {
-        let found = py.detach(|| self.inner.diff(&other.inner).map_err(error::of_study))?;
+        let found = py.detach(|| diff_studies(&self.inner, &other.inner).map_err(error::of_study))?;
         let shown = found.changes.render(LISTED, None);
         let notes = found.notes.iter().map(|note| format!("note: {note}"));
         answer::of(&found.changes, notes.chain([shown]).collect::<Vec<_>>().join("\n"))
@@ -173,16 +181,16 @@ impl Study {
         let gate = py.detach(|| {
             let metric = match metric {
                 Some(metric) => metric,
-                None => self.inner.leading_metric().map_err(error::of_study)?,
+                None => leading_metric(&self.inner).map_err(error::of_study)?,
             };
             let options = GateOptions { metric, margin, confidence, pool: self.pool || base.pool };
-            self.inner.gate(&base.inner, &options).map_err(error::of_study)
+            mirrorstats::gate(&base.inner, &self.inner, &options).map_err(error::of_study)
         })?;
         answer::of(&gate, gate.render(GateFormat::Text(None)))
     }
 
     fn explain(&self, py: Python<'_>, episode_id: &str) -> PyResult<Answer> {
-        let found = py.detach(|| self.inner.explain(episode_id).map_err(error::of_study))?;
+        let found = py.detach(|| mirrorstats::explain(&self.inner, episode_id).map_err(error::of_study))?;
         answer::of(&found, found.to_string())
     }
 }

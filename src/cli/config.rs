@@ -1,76 +1,41 @@
-//! Defaults of options from `mirrorstats.toml` and the environment.
+//! Defaults of options from `mirrorstats.toml`.
 //!
-//! A setting is a default of an option, for one command or for all that have it. Typed options take precedence, then
-//! the environment, then the file. In each of these, the setting of one command precedes that of all.
+//! A setting is a default of an option, for one command or for all that have it. Typed options take precedence, and the
+//! setting of one command precedes that of all.
 //!
 //! Rule: an unknown setting, or one with an invalid value, is refused before anything runs.
 
 use std::env;
-use std::fmt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{Arg, Command};
-use schemars::JsonSchema;
-use serde::Serialize;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
-use mirrorstats_exact::budget::{self, Limit};
+use crate::cli::outcome::Failure;
+use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::{input, suggest};
 use mirrorstats_toml_spec::{Fault, Faults, Place, Source, parse_toml};
 
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file; if it is empty, no file is read.
-pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
-const PREFIX: &str = "MIRRORSTATS_";
+const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
 const OWN_PROMPT: &str = "a prompt belongs to an experiment: name a file with `experiment = \"own.toml\"`, and write into it \
                           `[experiment.SHORT]` with `scenes = \"NAME\"` of the experiment to compare with and \
                           `prompt = \"short\"`, a folder beside it; `mirrorstats experiments explain NAME --prompt` prints a \
                           prompt to start from";
 const LARGEST: Limit = Limit::new("bytes of a configuration file", 1 << 20);
 
-/// The source of a setting.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Origin {
-    /// The configuration file.
-    File(String),
-    /// A variable of the environment.
-    Variable(String),
-}
-
 /// A default of an option.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Setting {
     /// The command, such as `definitions check`; none for every command that has the option.
-    pub command: Option<String>,
+    command: Option<String>,
     /// The option's long name.
     pub option: String,
-    /// Its values.
     pub values: Vec<String>,
-    /// Its source.
-    pub origin: Origin,
-}
-
-/// All settings in effect.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Settings {
-    /// The file that was read.
-    pub file: Option<String>,
-    /// Those of the file in its order, then the variables.
-    pub all: Vec<Setting>,
-}
-
-impl fmt::Display for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::File(name) | Self::Variable(name) => f.write_str(&visible(name)),
-        }
-    }
 }
 
 /// An option of a command.
@@ -79,46 +44,29 @@ pub struct Choice<'a> {
     arg: &'a Arg,
 }
 
-pub fn load(command: &Command) -> Result<Settings, Failure> {
-    let choices = choices(command, "");
-    let mut settings = Settings::default();
-    if let Some(path) = file()? {
-        let name = path.display().to_string();
-        settings.all = of_file(&path, &name, &choices)?;
-        settings.file = Some(name);
-    }
-    settings.all.extend(of_environment(&choices)?);
-    Ok(settings)
+/// The settings of the file that applies here, in its order; none without a file.
+pub fn load(command: &Command) -> Result<Vec<Setting>, Failure> {
+    file()?.map_or_else(|| Ok(Vec::new()), |path| of_file(&path, &choices(command, "")))
 }
 
-impl Settings {
-    pub fn apply(&self, command: Command) -> Command {
-        self.applied(command, "")
+/// A command whose subcommands have these defaults. `path` is its own name, empty for the program.
+pub fn with_defaults(command: Command, path: &str, settings: &[Setting]) -> Command {
+    let inner: Vec<String> = command.get_subcommands().map(|inner| inner.get_name().to_owned()).collect();
+    let command = inner.into_iter().fold(command, |command, name| {
+        let path = joined(path, &name);
+        command.mut_subcommand(name, |inner| with_defaults(inner, &path, settings))
+    });
+    if path.is_empty() {
+        return command;
     }
-
-    fn applied(&self, command: Command, path: &str) -> Command {
-        let inner: Vec<String> = command.get_subcommands().map(|inner| inner.get_name().to_owned()).collect();
-        let command = inner.into_iter().fold(command, |command, name| {
-            let path = joined(path, &name);
-            command.mut_subcommand(name, |inner| self.applied(inner, &path))
-        });
-        if path.is_empty() {
-            return command;
-        }
-        command.mut_args(|arg| match arg.get_long().and_then(|long| self.of(path, long)) {
+    let is_meant = |setting: &&Setting| setting.command.as_deref().is_none_or(|own| own == path);
+    command.mut_args(|arg| {
+        let own = settings.iter().filter(is_meant).filter(|setting| arg.get_long() == Some(setting.option.as_str()));
+        match own.max_by_key(|setting| setting.command.is_some()) {
             Some(setting) => arg.default_values(setting.values.clone()),
             None => arg,
-        })
-    }
-
-    fn of(&self, command: &str, option: &str) -> Option<&Setting> {
-        let rank = |setting: &Setting| (matches!(setting.origin, Origin::Variable(_)), setting.command.is_some());
-        let meant = self
-            .all
-            .iter()
-            .filter(|setting| setting.option == option && setting.command.as_deref().is_none_or(|own| own == command));
-        meant.max_by_key(|setting| rank(setting))
-    }
+        }
+    })
 }
 
 fn file() -> Result<Option<PathBuf>, Failure> {
@@ -153,13 +101,14 @@ fn joined(path: &str, name: &str) -> String {
     format!("{path} {name}").trim_start().to_owned()
 }
 
-fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
+fn of_file(path: &Path, choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
+    let name = path.display().to_string();
     let text = input::text(path, LARGEST).map_err(|error| {
         Failure::input(format!(
             "cannot read the configuration file `{name}`: {error}\n  help: `{FILE_VARIABLE}=` reads none"
         ))
     })?;
-    let source = Arc::new(Source { name: name.to_owned(), text });
+    let source = Arc::new(Source { name, text });
     let (table, faults) = parse_toml(&source);
     let mut reader = OptionFile::new(&source, choices, faults);
     let mut found = Vec::new();
@@ -222,8 +171,7 @@ impl<'a> OptionFile<'a> {
             self.fault(value.span(), message, None);
             return None;
         };
-        let (origin, option) = (Origin::File(self.source.name.clone()), key.get_ref().to_string());
-        let setting = Setting { command: command.map(str::to_owned), option, values, origin };
+        let setting = Setting { command: command.map(str::to_owned), option: key.get_ref().to_string(), values };
         match check(&setting, self.choices) {
             Ok(()) => return Some(setting),
             Err(Refusal::Option(message, help)) => self.fault(key.span(), message, help),
@@ -301,61 +249,4 @@ fn takes(choice: &Choice<'_>, setting: &Setting) -> Result<(), Refusal> {
             Err(Refusal::Value(first.trim_start_matches("error: ").to_owned()))
         }
     }
-}
-
-/// Settings from the environment: `MIRRORSTATS_THREADS` for every command, `MIRRORSTATS_RECORD_OUT` for one.
-fn of_environment(choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
-    let mut found = Vec::new();
-    for choice in choices {
-        let long = choice.arg.get_long().unwrap_or_default();
-        let of_one = (Some(choice.command.clone()), variable(&choice.command, long));
-        for (command, variable) in [(None, variable("", long)), of_one] {
-            let Some(value) = env::var_os(&variable) else { continue };
-            let value = value.into_string().map_err(|_| refused(&variable, "expected UTF-8 text"))?;
-            let origin = Origin::Variable(variable.clone());
-            let setting = Setting { command, option: long.to_owned(), values: vec![value], origin };
-            if found.contains(&setting) {
-                continue;
-            }
-            match check(&setting, choices) {
-                Ok(()) => found.push(setting),
-                Err(Refusal::Option(message, _) | Refusal::Value(message)) => return Err(refused(&variable, &message)),
-            }
-        }
-    }
-    found.sort_by(|a, b| a.origin.cmp(&b.origin));
-    Ok(found)
-}
-
-/// Variables that look like settings but are not, such as misspelt ones, each with a suggestion.
-pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
-    let choices = choices(command, "");
-    let known: Vec<String> = choices
-        .iter()
-        .flat_map(|choice| {
-            let long = choice.arg.get_long().unwrap_or_default();
-            ["", &choice.command].map(|name| variable(name, long))
-        })
-        .chain([FILE_VARIABLE, ERRORS_VARIABLE, budget::SETTING].map(str::to_owned))
-        .collect();
-    let names = env::vars_os().filter_map(|(name, _)| name.into_string().ok());
-    let mut unknown: Vec<String> = names.filter(|name| name.starts_with(PREFIX) && !known.contains(name)).collect();
-    unknown.sort_unstable();
-    let with_hint = |name: String| {
-        let near = suggest::nearest(&name, known.iter().map(String::as_str)).map(str::to_owned);
-        (name, near)
-    };
-    unknown.into_iter().map(with_hint).collect()
-}
-
-fn variable(command: &str, long: &str) -> String {
-    let name = joined(command, long).replace(['-', ' '], "_").to_ascii_uppercase();
-    format!("{PREFIX}{name}")
-}
-
-fn refused(variable: &str, why: &str) -> Failure {
-    Failure::input(format!(
-        "the environment variable {}: {why}\n  help: unset it, or see `mirrorstats setup config --help`",
-        visible(variable)
-    ))
 }

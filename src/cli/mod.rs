@@ -64,19 +64,19 @@ fn long_version() -> String {
 
 /// Runs the program with these arguments, which start with the program's name.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let _ = told_of_large_files();
+    let _ = fail_at_file_size_limit();
     ExitCode::from(run_to_code(arguments))
 }
 
 /// Makes a write beyond the file size limit fail with an error, instead of ending the process.
 #[cfg(unix)]
-fn told_of_large_files() -> io::Result<()> {
+fn fail_at_file_size_limit() -> io::Result<()> {
     use signal_hook::consts::SIGXFSZ;
     signal_hook::flag::register(SIGXFSZ, std::sync::Arc::default()).map(drop)
 }
 
 #[cfg(not(unix))]
-fn told_of_large_files() -> io::Result<()> {
+fn fail_at_file_size_limit() -> io::Result<()> {
     Ok(())
 }
 
@@ -95,10 +95,7 @@ pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
     let command = help::with_help(Cli::command());
     let settings = config::load(&command);
-    let command = match &settings {
-        Ok(settings) => settings.apply(command),
-        Err(_) => command,
-    };
+    let command = config::with_defaults(command, "", settings.as_deref().unwrap_or_default());
     let parse = |arguments: Vec<OsString>| {
         let matches = command.clone().try_get_matches_from(arguments)?;
         Cli::from_arg_matches(&matches)

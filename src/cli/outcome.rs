@@ -13,15 +13,18 @@
 
 use std::error::Error;
 use std::ffi::OsString;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::io::{self, Write as _};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use mirrorstats_exact::escape::visible_lines;
+use mirrorstats_study::StudyError;
 use mirrorstats_toml_spec::{FaultRecord, Faults};
 use mirrorstats_trace::diagnostic::{MORE_FILES, is_short_of_files};
+#[cfg(feature = "view")]
+use mirrorstats_view::ViewError;
 
 /// The form of errors if no option sets it; read before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
@@ -47,28 +50,64 @@ pub enum Outcome {
 }
 
 /// The error of a command that could not run to its end.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 pub enum Failure {
-    #[error("bad usage")]
     Usage(Box<clap::Error>),
-    #[error("cannot write the output")]
-    Output(#[from] io::Error),
-    #[error(transparent)]
+    Output(io::Error),
     Input(Box<dyn Error + Send + Sync>),
-    #[error(
-        "internal error: {0}\n  \
-         help: is there enough memory? If so, report the command and this message"
-    )]
     Panic(String),
-    #[error("{0}")]
+    /// A message with its own `error: ` and help.
     Rendered(String),
-    #[error("{0}")]
     Faults(Faults),
 }
 
 impl Failure {
     pub fn input(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::Input(error.into())
+    }
+
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Output(error) => Some(error),
+            Self::Input(error) => error.source(),
+            Self::Usage(_) | Self::Panic(_) | Self::Rendered(_) | Self::Faults(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(_) => f.write_str("bad usage"),
+            Self::Output(_) => f.write_str("cannot write the output"),
+            Self::Input(error) => error.fmt(f),
+            Self::Panic(fault) => {
+                let help = "is there enough memory? If so, report the command and this message";
+                write!(f, "internal error: {fault}\n  help: {help}")
+            }
+            Self::Rendered(text) => f.write_str(text),
+            Self::Faults(faults) => faults.fmt(f),
+        }
+    }
+}
+
+/// The only place that says what an error of the library is on the command line.
+impl<E: Error + Send + Sync + 'static> From<E> for Failure {
+    fn from(error: E) -> Self {
+        if let Some(faults) = Faults::of(&error) {
+            return Self::Faults(faults.clone());
+        }
+        let error: Box<dyn Error + Send + Sync> = Box::new(error);
+        #[cfg(feature = "view")]
+        let error: Box<dyn Error + Send + Sync> = match error.downcast::<ViewError>().map(|error| *error) {
+            Ok(ViewError::Study(error)) => error,
+            Ok(error) => Box::new(error),
+            Err(error) => error,
+        };
+        match error.downcast::<StudyError>() {
+            Ok(error) => error.into_io().map_or_else(Self::input, Self::Output),
+            Err(error) => error.downcast::<io::Error>().map_or_else(Self::Input, |error| Self::Output(*error)),
+        }
     }
 }
 

@@ -18,20 +18,20 @@ use mirrorstats_trace::read::open::TraceFile;
 
 /// Prints an answer: text for people or JSON for programs.
 pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, Failure> {
-    print_told(answer, json, |text, answer| write!(text, "{answer}"))
+    print_with(answer, json, |text, answer| write!(text, "{answer}"))
 }
 
-/// Prints an answer whose text `tell` writes.
-pub fn print_told<T: Serialize>(
+/// Prints an answer whose text `write` makes.
+pub fn print_with<T: Serialize>(
     answer: &T,
     json: bool,
-    tell: impl FnOnce(&mut String, &T) -> fmt::Result,
+    write: impl FnOnce(&mut String, &T) -> fmt::Result,
 ) -> Result<Outcome, Failure> {
     if json {
         return print_json(answer);
     }
     let mut text = String::new();
-    tell(&mut text, answer).map_err(Failure::input)?;
+    write(&mut text, answer)?;
     plain(visible_lines(text.trim_end()) + "\n")
 }
 
@@ -117,7 +117,7 @@ pub fn commit(file: NewFile, path: &Path) -> Result<(), Failure> {
 
 /// Refuses an output that is one of the files that the command reads.
 pub fn check_target<P: AsRef<Path>>(target: &Path, read: impl IntoIterator<Item = P>) -> Result<(), Failure> {
-    replace::check_target(target, read, "one that is read").map_err(Failure::input)
+    Ok(replace::check_target(target, read, "one that is read")?)
 }
 
 pub fn unwritable(path: &Path, error: io::Error) -> Failure {

@@ -1,4 +1,4 @@
-//! Defaults from a file and the environment, and the message for a refused command line.
+//! Defaults from a file, and the message for a refused command line.
 
 use std::fs;
 use std::path::Path;
@@ -32,15 +32,11 @@ fn written(folder: &Path, variables: &[(&str, &str)], typed: &[&str]) -> String 
 }
 
 #[test]
-fn options_override_variables_and_variables_override_the_file() {
+fn options_override_the_file() {
     let folder = configured("out = \"of-all\"\n[report]\nout = \"of-report\"\n");
     let here = folder.path();
-    let of_all = ("MIRRORSTATS_OUT", "of-variable");
-    let of_one = ("MIRRORSTATS_REPORT_OUT", "of-variable-of-report");
     assert_eq!(written(here, &[], &[]), "of-report");
-    assert_eq!(written(here, &[of_all], &[]), "of-variable");
-    assert_eq!(written(here, &[of_all, of_one], &[]), "of-variable-of-report");
-    assert_eq!(written(here, &[of_all, of_one], &["-o", "typed"]), "typed");
+    assert_eq!(written(here, &[], &["-o", "typed"]), "typed");
     assert_eq!(written(here, &[("MIRRORSTATS_CONFIG_FILE", "")], &[]), "reports/latest");
     let below = here.join("a/b");
     fs::create_dir_all(&below).unwrap();
@@ -63,34 +59,6 @@ fn flags_and_lists_may_stand_in_the_file() {
 }
 
 #[test]
-fn every_setting_is_shown_with_where_it_comes_from() {
-    let folder = configured("threads = 2\n[\"definitions\".check]\njson = true\n");
-    let variables = [("MIRRORSTATS_RECORD_OUT", "runs"), ("MIRRORSTATS_TREADS", "3")];
-    let shown = with(folder.path(), &variables, &["setup", "config", "--json"]);
-    let expected = json!({
-        "file": "mirrorstats.toml",
-        "settings": [
-            {"command": null, "option": "threads", "values": ["2"], "origin": {"file": "mirrorstats.toml"}},
-            {"command": "definitions check", "option": "json", "values": ["true"], "origin": {"file": "mirrorstats.toml"}},
-            {"command": "record", "option": "out", "values": ["runs"], "origin": {"variable": "MIRRORSTATS_RECORD_OUT"}},
-        ],
-        "unknown_variables": ["MIRRORSTATS_TREADS"],
-    });
-    let settings = if cfg!(feature = "sim") {
-        expected
-    } else {
-        let mut expected = expected;
-        expected["settings"].as_array_mut().unwrap().pop();
-        expected["unknown_variables"] = json!(["MIRRORSTATS_RECORD_OUT", "MIRRORSTATS_TREADS"]);
-        expected
-    };
-    assert_eq!(serde_json::from_str::<Value>(&shown.stdout).unwrap(), settings);
-    let Answer { stdout: text, stderr, .. } = with(folder.path(), &variables, &["setup", "config"]);
-    assert!(stderr.contains("MIRRORSTATS_TREADS sets nothing") && stderr.contains("did you mean"), "{stderr}");
-    assert!(text.contains("configuration file: mirrorstats.toml") && text.contains("--threads"), "{text}");
-}
-
-#[test]
 fn every_fault_of_the_file_is_underlined_before_anything_runs() {
     let folder =
         configured("threads = 0\nstyl = \"x\"\n[report]\nno-figures = \"perhaps\"\nby = { a = 1 }\n[recrd]\nx = 1\n");
@@ -109,11 +77,6 @@ fn every_fault_of_the_file_is_underlined_before_anything_runs() {
     assert!(!folder.path().join("reports").exists());
     assert!(run(folder.path(), &["report", "--help"]).done().contains("Usage"));
     assert!(run(folder.path(), &["setup", "completions", "bash"]).done().contains("mirrorstats"));
-    let refused = run(folder.path(), &["setup", "config"]).refused();
-    assert!(refused.contains("5 faults"), "{refused}");
-    let wrong =
-        with(tempfile::tempdir().unwrap().path(), &[("MIRRORSTATS_THREADS", "many")], &["score", "x"]).refused();
-    assert!(wrong.contains("the environment variable MIRRORSTATS_THREADS: invalid value 'many'"), "{wrong}");
     let gone = with(folder.path(), &[("MIRRORSTATS_CONFIG_FILE", "gone.toml")], &["score", "x"]).refused();
     assert!(gone.contains("cannot read the configuration file `gone.toml`"), "{gone}");
 }

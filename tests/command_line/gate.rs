@@ -206,15 +206,3 @@ fn a_filter_and_unusable_replies_are_beside_every_verdict() {
         }
     }
 }
-
-#[cfg(feature = "view")]
-#[test]
-fn a_flip_leads_to_its_frames_where_a_page_was_exported_beside_the_traces() {
-    let folder = two(&of(21, 21), &of(0, 21));
-    run(folder.path(), &["view", "new", "--export", "new-page"]).done();
-    let (_, found) = cell_of(folder.path(), &[]);
-    let flip = &found["flips"][0];
-    assert_eq!(flip["new"]["frames"], "new-page/index.html?view=episode&id=E1/ant/s1/r1&t=2");
-    // The page shows the later episodes, which have the same ids but other values.
-    assert_eq!(flip["base"]["frames"], Value::Null);
-}

@@ -136,7 +136,7 @@ const SHOWN: [&str; 27] = [
 ];
 
 /// Verbs whose output has no name of a trace.
-const NOT_SHOWN: [&str; 18] = [
+const NOT_SHOWN: [&str; 17] = [
     "plan",
     "record",
     "trace schema",
@@ -152,7 +152,6 @@ const NOT_SHOWN: [&str; 18] = [
     "world config",
     "world scene",
     "world sheet",
-    "setup config",
     "setup completions",
     "setup man",
 ];

@@ -35,7 +35,6 @@ fn an_input_trace_is_refused_as_the_output() {
     for command in [
         &["score", "a.parquet", "b.parquet", "-o"][..],
         &["score", ".", "--engine", "native", "-o"],
-        &["figure", "spider", "a.parquet", "--format", "svg", "-o"],
         #[cfg(feature = "polars")]
         &["query", "SELECT * FROM steps", "a.parquet", "-o"],
         #[cfg(feature = "polars")]
@@ -93,7 +92,7 @@ fn a_copy_of_an_input_may_be_replaced() {
 
 /// Draws a figure to `target` with standard output going to `stdout`.
 fn figure(folder: &Path, target: &str, stdout: Stdio) -> std::process::Output {
-    let words = ["figure", "spider", "a.parquet", "--format", "svg", "-o", target];
+    let words = ["figure", "spider", "a.parquet", "-o", target];
     program(folder).args(words).stdout(stdout).output().unwrap()
 }
 
@@ -145,7 +144,8 @@ fn a_folder_with_inputs_is_refused_as_the_output() {
     assert!(run(folder.path(), &["view", "runs", "--export", "runs"]).refused().contains("name another one"));
     // The library, and so Python, refuses it too.
     let study = mirrorstats::Study::open([&runs]).unwrap();
-    let report = study.report(&mirrorstats::ReportOptions { figures: false, ..Default::default() }).unwrap();
+    let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
+    let report = mirrorstats::report(&study, &options).unwrap();
     assert!(report.write(&runs).unwrap_err().to_string().contains("expected a folder for outputs"));
     // A new folder inside is allowed, because commands that read traces skip reports.
     run(folder.path(), &["report", "runs", "--no-figures", "--out", "runs/report"]).done();

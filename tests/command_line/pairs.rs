@@ -34,12 +34,11 @@ struct Walk {
 }
 
 /// Verbs that read no file of others.
-const WITHOUT_INPUT: [(&str, &str); 9] = [
+const WITHOUT_INPUT: [(&str, &str); 8] = [
     ("definitions show", "prints what is built in"),
     ("experiments show", "prints what is built in"),
     ("plan", "numbers of its command line"),
     ("setup completions", "prints what is built in"),
-    ("setup config", "the configuration of its own folder, at most 1 MiB"),
     ("setup man", "writes what is built in"),
     ("style show", "prints what is built in"),
     ("trace schema", "prints what is built in"),

@@ -113,8 +113,7 @@ fn quality_is_in_reports_in_info_and_in_check() {
     );
     assert_eq!(cell["cost_nano_usd"]["sum"], json!(24_000_000));
     assert!(run(at, &["trace", "info", "a.parquet"]).done().contains("timeout 2"));
-    run(at, &["trace", "check", "a.parquet", "--max-unreadable", "0.1", "--max-lost", "2", "--max-latency", "100"])
-        .done();
+    run(at, &["trace", "check", "a.parquet", "--max-unreadable", "0.1", "--max-lost", "2"]).done();
     let failed =
         run(at, &["trace", "check", "a.parquet", "--max-unreadable", "0.05", "--max-lost", "0"]).ends(1).stdout;
     assert!(failed.contains("E1, m: --max-unreadable: expected at most 0.05, found 0.0833"), "{failed}");
@@ -142,9 +141,8 @@ fn unrecorded_quality_passes_no_check_and_is_not_zero() {
     let failed = run(folder.path(), &["trace", "check", "a.parquet", "--max-unreadable", "1"]).ends(1).stdout;
     let told = "E1, m: --max-unreadable: not recorded for 1 of 1 steps, so the limit cannot be checked";
     assert!(failed.contains(told), "{failed}");
-    let failed =
-        run(folder.path(), &["trace", "check", "a.parquet", "--max-lost", "9", "--max-latency", "9"]).ends(1).stdout;
-    assert!(failed.contains("--max-lost: not recorded") && failed.contains("--max-latency: not recorded"), "{failed}");
+    let failed = run(folder.path(), &["trace", "check", "a.parquet", "--max-lost", "9"]).ends(1).stdout;
+    assert!(failed.contains("--max-lost: not recorded"), "{failed}");
     run(folder.path(), &["report", "a.parquet", "--out", "out"]).done();
     let quality = fs::read_to_string(folder.path().join("out/tables/quality.md")).unwrap();
     assert!(quality.contains("| E1 | m | 1 | -- | 1 | -- | -- | -- | -- | -- | -- |"), "{quality}");
@@ -158,11 +156,11 @@ fn a_limit_on_replies_that_are_recorded_in_part_is_not_satisfied() {
     write_trace(&at.join("a.parquet"), &known, OptionalColumns::used_by(&known));
     let unknown = [episode("e2", vec![Step { action: Some(Action::Done), ..Step::default() }])];
     write_trace(&at.join("b.parquet"), &unknown, OptionalColumns::NONE);
-    let limits = ["--max-unreadable", "1", "--max-lost", "0", "--max-latency", "1000"];
+    let limits = ["--max-unreadable", "1", "--max-lost", "0"];
     let answer = |files: &[&str]| run(at, &[&["trace", "check"], files, &limits].concat());
     answer(&["a.parquet"]).done();
     let failed = answer(&["a.parquet", "b.parquet"]).ends(1).stdout;
-    for (limit, missing) in [("max-unreadable", 1), ("max-latency", 1), ("max-lost", 2)] {
+    for (limit, missing) in [("max-unreadable", 1), ("max-lost", 2)] {
         assert!(failed.contains(&format!("--{limit}: not recorded for {missing} of 2 steps")), "{failed}");
     }
     let json: Value = serde_json::from_str(&answer(&["a.parquet", "b.parquet", "--json"]).ends(1).stdout).unwrap();

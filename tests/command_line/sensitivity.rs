@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use mirrorstats::Study;
-use mirrorstats_study::Thresholds;
+use mirrorstats_study::sensitivity::{Thresholds, sensitivity};
 use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::write::write_episodes;
 use proptest::prelude::*;
@@ -112,7 +112,7 @@ fn compare(inputs: &str, px: u32) {
     fs::write(&edited, format!("include = [\"paper\"]\n[let]\nvisible = \"mirror_self_px >= {px}\"\n")).unwrap();
     let by_hand = Study::open([inputs]).unwrap().definitions(edited.to_str().unwrap()).unwrap().cells().unwrap();
     let study = Study::open([inputs]).unwrap();
-    let report = study.sensitivity(&px.to_string().parse::<Thresholds>().unwrap()).unwrap();
+    let report = sensitivity(&study, &px.to_string().parse::<Thresholds>().unwrap()).unwrap();
     let as_is = study.cells().unwrap();
     assert_eq!(report.found.metrics, ["MCR", "MTATO", "CR", "MGD", "SC", "AR_SC"]);
     let mut compared = 0;
@@ -154,7 +154,7 @@ fn definitions_without_a_threshold_are_refused() {
     write_episodes(&folder.path().join("some.parquet"), None, &some).unwrap();
     run(folder.path(), &["score", "a.parquet", "-o", "scores.parquet"]).done();
     let paper = fixture("paper/E1-gpt-5-1.parquet");
-    let cases: [(&[&str], &[&str]); 9] = [
+    let cases: [(&[&str], &[&str]); 7] = [
         (&[paper.to_str().unwrap()], &["no trace has it", "mirrorstats record"]),
         (&["some.parquet"], &["1 in 1 of 2 episodes", "`E1-m-2`", "--where \"all(mirror_self_px is not null)\""]),
         (&["scores.parquet"], &["found scores"]),
@@ -162,8 +162,6 @@ fn definitions_without_a_threshold_are_refused() {
         (&["a.parquet", "--definitions", "once.toml"], &["found true or false, one value per episode"]),
         (&["a.parquet", "--metrics", "TSA,TTD"], &["found none among TSA, TTD"]),
         (&["a.parquet", "--where", "run = 99"], &["run"]),
-        (&["a.parquet", "--figure", "a.jpg"], &["`jpg`"]),
-        (&["a.parquet", "--figure", "a.parquet"], &["`parquet`"]),
     ];
     for (arguments, words) in cases {
         let message = run(folder.path(), &[&["definitions", "sensitivity"], arguments].concat()).refused();

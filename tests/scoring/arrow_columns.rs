@@ -7,7 +7,8 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::DataType;
 use mirrorstats::{DiffRequest, Side, Study, StudyError, diff, episode_batch, resolve};
 use mirrorstats_score::format::Format;
-use mirrorstats_study::write_scores;
+use mirrorstats_study::diff::diff_studies;
+use mirrorstats_study::scores;
 use mirrorstats_trace::episodes::episode::{Action, Extra, Step};
 use mirrorstats_trace::write::{OptionalColumns, write_episodes};
 
@@ -20,7 +21,7 @@ fn episodes_equal_the_output_of_score() {
     for (traces, definitions) in [("fixtures/paper", "paper"), ("fixtures/recorded", "extended")] {
         let table = Study::open([traces]).unwrap().definitions(definitions).unwrap().score().unwrap().episodes;
         let mut bytes = Vec::new();
-        write_scores(&table, Format::Parquet, &mut bytes, std::num::NonZeroUsize::MIN).unwrap();
+        scores::write(&table, Format::Parquet, &mut bytes, std::num::NonZeroUsize::MIN).unwrap();
         std::fs::write(&path, bytes).unwrap();
         let (batch, written) = (episode_batch(&table).unwrap(), rows(&path));
         assert_eq!(batch.columns(), written.columns(), "{traces}");
@@ -122,26 +123,26 @@ fn two_studies_of_the_same_traces_differ_as_their_definitions_do() {
     let traces = resolve(&[folder.path().as_os_str().to_owned()], std::io::empty()).unwrap();
     let request = DiffRequest { by: by.to_vec(), ..DiffRequest::default() };
     let expected = diff(&Side::of(&early).unwrap(), &Side::of(&late).unwrap(), &traces, &request).unwrap();
-    let found = old.diff(&new).unwrap();
+    let found = diff_studies(&old, &new).unwrap();
     assert_eq!(found.changes, expected.changes);
     assert_eq!((found.changes.flips.len(), found.notes.len()), (3, 0));
-    assert!(old.diff(&old).unwrap().changes.is_empty());
+    assert!(diff_studies(&old, &old).unwrap().changes.is_empty());
 }
 
 #[test]
 fn studies_of_other_traces_differ_without_timesteps() {
     let folder = folder();
     let of = |file: &str| Study::open([folder.path().join(file).to_str().unwrap()]).unwrap();
-    let found = of("a.parquet").diff(&of("b.parquet")).unwrap();
+    let found = diff_studies(&of("a.parquet"), &of("b.parquet")).unwrap();
     assert!(found.changes.flips.is_empty() && !found.changes.is_empty(), "no episode is on both sides");
     let filtered = study(folder.path()).filter("length() = 1").unwrap();
-    assert!(!study(folder.path()).diff(&filtered).unwrap().changes.is_empty());
+    assert!(!diff_studies(&study(folder.path()), &filtered).unwrap().changes.is_empty());
 }
 
 #[test]
 fn an_unknown_table_is_refused_with_the_styles_tables() {
     let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
-    let report = Study::open(["fixtures/paper"]).unwrap().report(&options).unwrap();
+    let report = mirrorstats::report(&Study::open(["fixtures/paper"]).unwrap(), &options).unwrap();
     assert_eq!(report.table("main").unwrap().name, "main");
     let error = report.table("mian").unwrap_err().to_string();
     assert!(error.contains("`mian`; it has main") && error.ends_with("did you mean `main`?"), "{error}");

@@ -23,7 +23,7 @@ fn after(change: impl Fn(&Path)) -> [Result<(), StudyError>; 3] {
     assert_eq!(study.score().unwrap().episodes.len(), 4);
     change(&paths[1]);
     let options = ReportOptions { figures: false, ..Default::default() };
-    [study.score().map(drop), study.cells().map(drop), study.report(&options).map(drop)]
+    [study.score().map(drop), study.cells().map(drop), mirrorstats::report(&study, &options).map(drop)]
 }
 
 #[track_caller]

@@ -11,7 +11,6 @@ use serde_json::Value;
 
 use super::cluster::{Cluster, get, word_after};
 use super::{Answer, answer, episode, fixture, program, write};
-use crate::harness::files::{assert_same, contents};
 use crate::harness::program::{Running, wait_for};
 
 /// Features that engines may implement differently: texts, patterns, 64 bits, nested windows, reserved words.
@@ -47,10 +46,10 @@ const SMALL: [&str; 8] = [
     "spark.sql.codegen.wholeStage=false",
 ];
 
-fn on(cluster: &Cluster, folder: &Path, name: &str, arguments: &[&str]) -> Command {
+fn on(cluster: &Cluster, folder: &Path, arguments: &[&str]) -> Command {
     let mut command = program(folder);
     command.env("PYTHONPATH", &cluster.packages).env("SPARK_LOCAL_IP", "127.0.0.1");
-    command.args([name, "--engine", "spark", "--master", &cluster.master]).args(arguments);
+    command.args(["score", "--engine", "spark", "--master", &cluster.master]).args(arguments);
     for setting in SMALL {
         command.args(["--spark-conf", setting]);
     }
@@ -58,7 +57,7 @@ fn on(cluster: &Cluster, folder: &Path, name: &str, arguments: &[&str]) -> Comma
 }
 
 fn spark(cluster: &Cluster, folder: &Path, arguments: &[&str]) -> Answer {
-    answer(&mut on(cluster, folder, "score", arguments))
+    answer(&mut on(cluster, folder, arguments))
 }
 
 fn native(folder: &Path, arguments: &[&str]) -> String {
@@ -76,10 +75,10 @@ fn a_cluster_gives_the_scores_of_the_native_engine() {
 
 #[test]
 #[ignore = "soak: a cluster of its own, three more statements"]
-fn soak_a_cluster_gives_the_native_report_and_refuses_unreadable_traces() {
+fn soak_a_cluster_gives_the_native_scores_and_refuses_unreadable_traces() {
     let cluster = Cluster::start();
     what_a_uri_does_not_give_is_refused(&cluster);
-    a_report_is_the_native_one(&cluster);
+    the_scores_of_files_are_the_native_ones(&cluster);
 }
 
 fn texts_and_patterns_from_a_uri_into_a_folder(cluster: &Cluster) {
@@ -135,27 +134,20 @@ fn what_a_uri_does_not_give_is_refused(cluster: &Cluster) {
     assert!(none.contains("[PATH_NOT_FOUND]") && none.lines().count() == 2, "{none}");
 }
 
-fn a_report_is_the_native_one(cluster: &Cluster) {
+fn the_scores_of_files_are_the_native_ones(cluster: &Cluster) {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let traces = fixture("paper");
-    let arguments = |out| [traces.to_str().unwrap(), "--by", "experiment,body_color", "--no-figures", "--out", out];
-    answer(&mut on(cluster, at, "report", &arguments("spark"))).done();
-    answer(program(at).arg("report").args(arguments("native"))).done();
-    let native = contents(&at.join("native"));
-    assert!(native.contains_key("cells.csv") && native.len() > 4);
-    assert_same(&contents(&at.join("spark")), &native);
+    spark(cluster, at, &[traces.to_str().unwrap(), "-o", "spark.parquet"]).done();
+    native(at, &[traces.to_str().unwrap(), "-o", "native.parquet"]);
+    assert!(fs::read(at.join("spark.parquet")).unwrap() == fs::read(at.join("native.parquet")).unwrap());
 }
 
 fn nothing_runs_on_when_the_program_is_gone(cluster: &Cluster) {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["--spark-log", "log", "--spark-conf", "spark.sql.shuffle.partitions=2000"];
-    let mut child = started(&mut on(
-        cluster,
-        folder.path(),
-        "score",
-        &[&[fixture("paper").to_str().unwrap()], &arguments[..]].concat(),
-    ));
+    let mut child =
+        started(&mut on(cluster, folder.path(), &[&[fixture("paper").to_str().unwrap()], &arguments[..]].concat()));
     let running = || cluster.state()["activeapps"].as_array().is_some_and(|apps| !apps.is_empty());
     wait_for("the application", || running().then_some(()));
     let driver = || word_after(&folder.path().join("log"), "Successfully started service 'SparkUI' on port ");
@@ -184,7 +176,7 @@ fn a_worker_may_be_killed(cluster: &mut Cluster) {
     ] {
         arguments.extend(["--spark-conf", setting]);
     }
-    let mut command = on(cluster, at, "score", &arguments);
+    let mut command = on(cluster, at, &arguments);
     command.args(["--spark-conf", "spark.sql.shuffle.partitions=30"]);
     let mut child = started(&mut command);
     let page = wait_for("the driver's page", || {

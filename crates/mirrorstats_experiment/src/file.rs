@@ -25,7 +25,7 @@ pub enum FileError {
         path.display()
     )]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error(transparent)]
+    #[error("{0}")]
     Faults(#[from] Faults),
 }
 

@@ -178,7 +178,7 @@ pub enum ReplaceError {
          help: let `{name}` say at which steps there is evidence, such as \"mirror_visible\""
     )]
     NoCondition { name: String, found: String },
-    #[error(transparent)]
+    #[error("{0}")]
     Faults(#[from] Faults),
 }
 

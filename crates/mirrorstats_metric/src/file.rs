@@ -94,7 +94,7 @@ pub struct ExperimentEntry {
 pub enum FileError {
     #[error("cannot read the definition file `{path}`; {}", KIND.did_you_mean(path))]
     Unreadable { path: String, source: std::io::Error },
-    #[error(transparent)]
+    #[error("{0}")]
     Faults(#[from] Faults),
 }
 

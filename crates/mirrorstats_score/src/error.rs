@@ -30,13 +30,13 @@ pub enum EngineError {
 pub enum ScoreError {
     #[error(transparent)]
     Trace(#[from] TraceError),
-    #[error(transparent)]
+    #[error("{0}")]
     Definitions(#[from] FileError),
     #[error(transparent)]
     Carried(#[from] RestoreError),
     #[error(transparent)]
     Declaration(#[from] DeclarationError),
-    #[error(transparent)]
+    #[error("{0}")]
     Condition(#[from] Faults),
     #[error(transparent)]
     Metric(#[from] UnknownMetric),

@@ -80,7 +80,7 @@ pub struct Fact {
 
 #[derive(Debug, thiserror::Error)]
 pub enum EvidenceError {
-    #[error(transparent)]
+    #[error("{0}")]
     Score(#[from] ScoreError),
     #[error("no episode `{wanted}` among the {episodes} of the traces; {}", .near.as_ref().map_or_else(|| "`mirrorstats score` lists them".to_owned(), |near| format!("did you mean `{near}`?")))]
     NoSuchEpisode { wanted: String, episodes: usize, near: Option<String> },

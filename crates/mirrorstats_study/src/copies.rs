@@ -2,40 +2,37 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::Study;
-use super::error::StudyError;
+use crate::{Study, StudyError};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_score::tables::table::EpisodeTable;
-use mirrorstats_trace::copies::copies;
+use mirrorstats_trace::copies::copies as find;
 
 const NAMED: usize = 3;
 
 #[derive(Clone, Debug)]
-pub(super) struct Copies {
+pub(crate) struct Copies {
     pub phrase: String,
     pub sentence: String,
 }
 
-impl Study {
-    /// The episodes that are copies of others; `None` without copies, and for scores, which have no steps to compare.
-    pub(super) fn copies(&self, table: &EpisodeTable) -> Result<Option<Copies>, StudyError> {
-        let Ok(traces) = self.source.traces() else { return Ok(None) };
-        let found = copies(traces, alike(table), self.threads)?;
-        let named: Vec<String> = found.iter().take(NAMED).map(|it| named(&it.episode, &it.of)).collect();
-        let rest = found.len().saturating_sub(NAMED);
-        let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
-        let (episodes, count) = match found.len() {
-            0 => return Ok(None),
-            1 => ("episode is a copy of another", 1),
-            count => ("episodes are copies of others", count),
-        };
-        let phrase = format!("{count} {episodes}");
-        let sentence = format!(
-            "{phrase} under another id ({}{rest}): every number and test counts them as independent; leave them out.",
-            named.join("; ")
-        );
-        Ok(Some(Copies { phrase, sentence }))
-    }
+/// The episodes that are copies of others; `None` without copies, and for scores, which have no steps to compare.
+pub(crate) fn copies(study: &Study, table: &EpisodeTable) -> Result<Option<Copies>, StudyError> {
+    let Ok(traces) = study.traces() else { return Ok(None) };
+    let found = find(traces, alike(table), study.threads)?;
+    let named: Vec<String> = found.iter().take(NAMED).map(|it| named(&it.episode, &it.of)).collect();
+    let rest = found.len().saturating_sub(NAMED);
+    let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
+    let (episodes, count) = match found.len() {
+        0 => return Ok(None),
+        1 => ("episode is a copy of another", 1),
+        count => ("episodes are copies of others", count),
+    };
+    let phrase = format!("{count} {episodes}");
+    let sentence = format!(
+        "{phrase} under another id ({}{rest}): every number and test counts them as independent; leave them out.",
+        named.join("; ")
+    );
+    Ok(Some(Copies { phrase, sentence }))
 }
 
 fn named(episode: &str, of: &str) -> String {

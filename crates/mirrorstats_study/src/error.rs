@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::io;
 
-use super::own_definitions::ScoredAlike;
-use super::provenance::ProvenanceError;
+use crate::own_definitions::ScoredAlike;
+use crate::provenance::ProvenanceError;
 use mirrorstats_engines::spark::SparkError;
 use mirrorstats_exact::budget::Exceeded;
 use mirrorstats_exact::moments::MomentOverflow;
@@ -167,19 +167,19 @@ pub enum StudyError {
     Import(#[from] ImportError),
     #[error(transparent)]
     Trace(#[from] TraceError),
-    #[error(transparent)]
+    #[error("{0}")]
     Score(#[from] ScoreError),
-    #[error(transparent)]
+    #[error("{0}")]
     Definitions(#[from] FileError),
-    #[error(transparent)]
+    #[error("{0}")]
     Filter(#[from] Faults),
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    #[error(transparent)]
+    #[error("{0}")]
     Evidence(#[from] EvidenceError),
     #[error(transparent)]
     Format(#[from] FormatError),
-    #[error(transparent)]
+    #[error("{0}")]
     Select(#[from] SelectError),
     #[error(transparent)]
     Group(#[from] GroupError),
@@ -187,7 +187,7 @@ pub enum StudyError {
     Declaration(#[from] DeclarationError),
     #[error(transparent)]
     Overflow(#[from] MomentOverflow),
-    #[error(transparent)]
+    #[error("{0}")]
     Style(#[from] StyleError),
     #[error(transparent)]
     Published(#[from] PublishedError),
@@ -217,20 +217,8 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    pub(super) fn file(name: &str, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+    pub(crate) fn file(name: &str, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::File { name: name.to_owned(), source: source.into() }
-    }
-
-    /// The faults of definitions or of a filter, which are printed with the source underlined.
-    pub fn faults(&self) -> Option<&Faults> {
-        match self {
-            Self::Filter(faults)
-            | Self::Select(SelectError::Condition(faults))
-            | Self::Style(StyleError::Faults(faults)) => Some(faults),
-            Self::Definitions(error) => faults_of_file(error),
-            Self::Score(error) | Self::Evidence(EvidenceError::Score(error)) => faults_of_scoring(error),
-            _ => None,
-        }
     }
 
     /// The system's error if writing the answer failed, for example because the reader closed a pipe. Errors: this
@@ -253,19 +241,4 @@ fn differing(groups: &[ScoredAlike]) -> String {
     let ask = |group: &ScoredAlike| format!("--where \"{}\" --definitions {}", group.condition, group.definitions);
     let found = groups.iter().map(one).collect::<Vec<_>>().join(", ");
     format!("{found}\n  help: ask for each by itself: {}", groups.iter().map(ask).collect::<Vec<_>>().join("; or "))
-}
-
-fn faults_of_scoring(error: &ScoreError) -> Option<&Faults> {
-    match error {
-        ScoreError::Condition(faults) => Some(faults),
-        ScoreError::Definitions(error) => faults_of_file(error),
-        _ => None,
-    }
-}
-
-fn faults_of_file(error: &FileError) -> Option<&Faults> {
-    match error {
-        FileError::Faults(faults) => Some(faults),
-        FileError::Unreadable { .. } => None,
-    }
 }

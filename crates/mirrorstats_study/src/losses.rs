@@ -5,9 +5,8 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use super::Study;
-use super::error::StudyError;
-use super::results::Results;
+use crate::StudyError;
+use crate::results::Results;
 use mirrorstats_analysis::statistics::Replies;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind};
@@ -31,19 +30,37 @@ pub enum LostAs {
 }
 
 #[derive(Debug)]
-pub(super) struct Counted {
+pub(crate) struct Counted {
     pub results: Results,
     pub all: Option<EpisodeTable>,
     pub lost: LostCounts,
 }
 
 impl Counted {
-    pub(super) fn replies(&self) -> Option<Replies> {
+    /// The episodes that count, and how many were lost.
+    pub(crate) fn of(results: Results, lost_as: LostAs) -> Self {
+        let lost = counts(&results.episodes);
+        if lost.is_empty() {
+            return Self { results, all: None, lost };
+        }
+        match lost_as {
+            LostAs::Nothing => without(results, lost),
+            LostAs::Failure => {
+                let episodes = with_failures(&results.episodes);
+                // Episodes without a look, claim or decision have no timeline.
+                let timelines = results.timelines.filter(|timelines| timelines.len() == episodes.len());
+                let all = Some(episodes.clone());
+                Self { results: Results { episodes, timelines, ..results }, all, lost }
+            }
+        }
+    }
+
+    pub(crate) fn replies(&self) -> Option<Replies> {
         Replies::from_table(self.all.as_ref().unwrap_or(&self.results.episodes))
     }
 }
 
-pub(super) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
+pub(crate) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
     let mut listed = lost::beside(inputs)?;
     if listed.is_empty() {
         return Ok(listed);
@@ -54,7 +71,7 @@ pub(super) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<L
     Ok(listed)
 }
 
-pub(super) fn label(results: &mut Results) {
+pub(crate) fn label(results: &mut Results) {
     let Results { episodes, lost, quality, .. } = results;
     if let Some(ids) = lost.as_ref().filter(|ids| !ids.is_empty()) {
         let is_lost = |row| ids.contains(episodes.keys.get(row).episode_id).then_some(YES);
@@ -99,7 +116,7 @@ fn cell(experiment: &str, model: &str, condition: Option<&str>) -> CellKey {
 }
 
 /// A line that names the cells with lost episodes or replies without a decision; `None` without any.
-pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Option<String> {
+pub(crate) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Option<String> {
     const NAMED: usize = 8;
     let mut cells: BTreeMap<[&str; 2], [u64; 3]> = BTreeMap::new();
     for (key, count) in lost.iter() {
@@ -109,40 +126,22 @@ pub(super) fn beside_cells(lost: &LostCounts, replies: Option<&Replies>) -> Opti
         let counts = cells.entry([&it.key.experiment, &it.key.model]).or_default();
         (counts[1], counts[2]) = (counts[1] + it.unusable, counts[2] + it.replies);
     }
-    let told = |([experiment, model], [lost, unusable, replies]): (&[&str; 2], &[u64; 3])| {
+    let words = |([experiment, model], [lost, unusable, replies]): (&[&str; 2], &[u64; 3])| {
         let lost = (*lost > 0).then(|| format!("{lost} lost"));
         let unusable = (*unusable > 0).then(|| format!("{unusable} of {replies} replies without a decision"));
         let what: Vec<String> = lost.into_iter().chain(unusable).collect();
         format!("{} {} {}", visible(experiment), visible(model), what.join(", "))
     };
-    let named: Vec<String> = cells.iter().take(NAMED).map(told).collect();
+    let named: Vec<String> = cells.iter().take(NAMED).map(words).collect();
     let rest = cells.len().saturating_sub(NAMED);
     let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
     (!named.is_empty()).then(|| format!("Beside the numbers: {}{rest}.", named.join("; ")))
 }
 
-pub(super) fn told(lost: u64) -> String {
+/// `2 episodes were lost without an answer`.
+pub(crate) fn lost_episodes(lost: u64) -> String {
     let (noun, verb) = if lost == 1 { ("episode", "was") } else { ("episodes", "were") };
     format!("{lost} {noun} {verb} lost without an answer")
-}
-
-impl Study {
-    pub(super) fn counted(&self, results: Results) -> Counted {
-        let lost = counts(&results.episodes);
-        if lost.is_empty() {
-            return Counted { results, all: None, lost };
-        }
-        match self.question.lost {
-            LostAs::Nothing => without(results, lost),
-            LostAs::Failure => {
-                let episodes = with_failures(&results.episodes);
-                // Episodes without a look, claim or decision have no timeline.
-                let timelines = results.timelines.filter(|timelines| timelines.len() == episodes.len());
-                let all = Some(episodes.clone());
-                Counted { results: Results { episodes, timelines, ..results }, all, lost }
-            }
-        }
-    }
 }
 
 fn without(results: Results, lost: LostCounts) -> Counted {

@@ -3,6 +3,7 @@
 //! A fault points into a [`Source`] by byte range; [`Faults`] renders every fault with its lines and underlines the
 //! span, like a compiler.
 
+use std::error::Error;
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
@@ -113,6 +114,18 @@ pub struct FaultRecord {
 }
 
 impl Faults {
+    /// The faults that are all that an error says; `None` for an error that says anything else.
+    pub fn of<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Self> {
+        let mut link = error;
+        let faults: &Self = loop {
+            match link.downcast_ref() {
+                Some(faults) => break faults,
+                None => link = link.source()?,
+            }
+        };
+        (faults.to_string() == error.to_string()).then_some(faults)
+    }
+
     pub fn render(&self, colored: bool) -> String {
         let renderer = if colored { Renderer::styled() } else { Renderer::plain() };
         let mut texts: Vec<String> = self.0.iter().map(|fault| fault.render(&renderer)).collect();
@@ -161,7 +174,7 @@ impl fmt::Display for Faults {
     }
 }
 
-impl std::error::Error for Faults {}
+impl Error for Faults {}
 
 #[cfg(test)]
 mod tests {

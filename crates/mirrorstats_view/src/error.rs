@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_log::LogError;
 use mirrorstats_study::StudyError;
+use mirrorstats_toml_spec::Faults;
 use mirrorstats_trace::beside::label_line::LabelsError;
 use mirrorstats_trace::error::TraceError;
 
@@ -53,9 +54,7 @@ impl ViewError {
     }
 
     pub(super) fn words(&self) -> String {
-        if let Self::Study(error) = self
-            && let Some(faults) = error.faults()
-        {
+        if let Some(faults) = Faults::of(self) {
             return faults.render(false);
         }
         let mut words = visible_lines(&self.to_string());

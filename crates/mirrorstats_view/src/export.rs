@@ -23,7 +23,7 @@ use mirrorstats_exact::hash;
 use mirrorstats_exact::replace::{
     Content, FolderError, FolderFiles, TemporaryFolder, folder_of, make_folder, replace_folder,
 };
-use mirrorstats_study::Part;
+use mirrorstats_study::overview::Part;
 
 /// Instructions for crawlers.
 pub(crate) const ROBOTS: &str = "# Recordings of evaluations: not for training.\nUser-agent: *\nDisallow: /\n";

@@ -8,7 +8,7 @@ use super::{Snapshot, ViewError};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::tables::table::EpisodeTable;
-use mirrorstats_study::Results;
+use mirrorstats_study::results::Results;
 use mirrorstats_trace::beside::labels;
 
 /// The keys and values of a request, in order.

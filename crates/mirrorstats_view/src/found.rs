@@ -11,7 +11,7 @@ use std::time::{Duration, UNIX_EPOCH};
 use super::error::{Renamed, ViewError};
 use mirrorstats_exact::replace::{FolderError, folder_of};
 use mirrorstats_log::frames;
-use mirrorstats_study::resolve;
+use mirrorstats_study::inputs::resolve;
 use mirrorstats_trace::beside::labels::list_beside;
 use mirrorstats_trace::beside::lost::list_of;
 use mirrorstats_trace::inputs::Input;

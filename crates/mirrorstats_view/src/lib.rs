@@ -17,7 +17,7 @@
 //! # let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper");
 //! let view = View::open(Options {
 //!     runs: vec![paper.into()],
-//!     question: mirrorstats_study::Question::default(),
+//!     question: mirrorstats_study::question::Question::default(),
 //!     against: None,
 //!     style: "default".to_owned(),
 //!     coder: None,
@@ -46,7 +46,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
-use mirrorstats_study::Question;
+use mirrorstats_study::question::Question;
 
 use answers::{Answer, answer, labels, live};
 pub use error::ViewError;

@@ -215,7 +215,7 @@ pub struct Choice {
 pub enum ModelsError {
     #[error("cannot read the models in `{}`: {source}", path.display())]
     Unreadable { path: PathBuf, source: std::io::Error },
-    #[error(transparent)]
+    #[error("{0}")]
     Faults(#[from] Faults),
     #[error(
         "no model is called `{name}`{near}; expected the name or the id of one of: {known}\n  help: `--models FILE` adds models, `--backend NAME` or `--base-url URL` takes any id"

@@ -1,6 +1,5 @@
 //! `experiments`: check a file of experiments, explain an experiment in words, list and show built-in ones.
 
-use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -95,14 +94,12 @@ fn check(file: &Path, json: bool) -> Result<Outcome, Failure> {
     if json {
         return answer(loaded.iter().map(|one| &one.experiment));
     }
-    let mut out = io::stdout().lock();
-    writeln!(out, "{}: no fault", visible(&file.display().to_string()))?;
-    for one in &loaded {
-        let (experiment, templates) = (&one.experiment, one.experiment.templates());
-        writeln!(out, "  {}: {}", experiment.name(), visible(&experiment.title))?;
-        writeln!(out, "    prompt {}, sha256 {}", visible(&experiment.prompt), templates.hash())?;
-    }
-    Ok(Outcome::Done)
+    let line = |Loaded { experiment, .. }: &Loaded| {
+        let (title, prompt) = (visible(&experiment.title), visible(&experiment.prompt));
+        format!("  {}: {title}\n    prompt {prompt}, sha256 {}\n", experiment.name(), experiment.templates().hash())
+    };
+    let lines: String = loaded.iter().map(line).collect();
+    output::plain(format!("{}: no fault\n{lines}", visible(&file.display().to_string())))
 }
 
 fn answer<'a>(experiments: impl Iterator<Item = &'a Experiment>) -> Result<Outcome, Failure> {
@@ -134,17 +131,13 @@ fn prompt_of(experiment: &Experiment) -> String {
 }
 
 fn show(name: Option<&str>) -> Result<Outcome, Failure> {
-    let mut out = io::stdout().lock();
     let Some(name) = name else {
-        for experiment in built_in_names().into_iter().flat_map(Experiment::parse) {
-            writeln!(out, "{:<12}  {}", experiment.name(), experiment.title)?;
-        }
-        return Ok(Outcome::Done);
+        let line = |experiment: Experiment| format!("{:<12}  {}\n", experiment.name(), experiment.title);
+        let all = built_in_names().into_iter().flat_map(Experiment::parse);
+        return output::plain(all.map(line).collect::<String>());
     };
     let unknown = || UnknownExperiment { name: name.to_owned() };
-    let text = built_in(name).ok_or_else(|| unknown_name(&unknown()))?;
-    out.write_all(text.as_bytes())?;
-    Ok(Outcome::Done)
+    output::plain(built_in(name).ok_or_else(|| unknown_name(&unknown()))?)
 }
 
 fn unknown_name(unknown: &UnknownExperiment) -> Failure {

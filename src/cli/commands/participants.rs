@@ -36,16 +36,16 @@ enum ParticipantsCommand {
 impl ParticipantsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let ParticipantsCommand::Remove { code, folder, json } = self.command;
-        let removed = participants::remove(&folder, &code).map_err(Failure::input)?;
+        let removed = participants::remove(&folder, &code).map_err(Failure::Input)?;
         if removed == Removed::default() {
             let (code, folder) = (visible(&code), folder.display());
             return Err(Failure::input(format!("{folder} has nothing of the participant `{code}`")));
         }
-        output::print_told(&removed, json, tell)
+        output::print_with(&removed, json, write_answer)
     }
 }
 
-fn tell(text: &mut String, removed: &Removed) -> fmt::Result {
+fn write_answer(text: &mut String, removed: &Removed) -> fmt::Result {
     let Removed { episodes, files, journal_lines, label_lines } = removed;
     let (count, lines) = (counted(episodes.len() as u64, "episode"), counted(*journal_lines as u64, "line"));
     let labels = counted(*label_lines as u64, "line");

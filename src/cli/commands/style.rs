@@ -1,6 +1,5 @@
 //! `style`: show a built-in style, or check a style file.
 
-use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
@@ -9,7 +8,6 @@ use mirrorstats_exact::suggest::hint;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_report::style::{Style, built_in, built_in_names};
 use mirrorstats_score::vocabulary::schema_columns;
-use mirrorstats_study::StudyError;
 
 /// Show and check styles: how tables look
 #[derive(Clone, Debug, clap::Args)]
@@ -57,14 +55,11 @@ fn show(name: &str) -> Result<Outcome, Failure> {
 }
 
 fn check(file: &Path, definitions: &Path) -> Result<Outcome, Failure> {
-    let style = Style::load(file).map_err(StudyError::from)?;
-    let catalog = Definitions::load(definitions, &schema_columns()).map_err(StudyError::from)?.catalog;
-    style.check_against(&catalog).map_err(StudyError::from)?;
-    let mut out = io::stdout().lock();
-    writeln!(out, "{}: no fault", visible(&file.display().to_string()))?;
-    for (name, table) in &style.sheet.table {
-        writeln!(out, "  table {name}: {}", visible(&table.columns.join(", ")))?;
-    }
-    writeln!(out, "  sha256 {}", style.hash)?;
-    Ok(Outcome::Done)
+    let style = Style::load(file)?;
+    let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
+    style.check_against(&catalog)?;
+    let tables = style.sheet.table.iter();
+    let tables = tables.map(|(name, table)| format!("  table {name}: {}\n", visible(&table.columns.join(", "))));
+    let (file, tables) = (visible(&file.display().to_string()), tables.collect::<String>());
+    output::plain(format!("{file}: no fault\n{tables}  sha256 {}\n", style.hash))
 }

@@ -136,8 +136,8 @@ fn rounded(mean: f64) -> u64 {
 }
 
 /// Prints the forecasts of several models, and their total.
-pub(crate) fn tell_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> io::Result<()> {
-    answers.iter().try_for_each(|answer| tell(out, answer))?;
+pub(crate) fn write_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> io::Result<()> {
+    answers.iter().try_for_each(|answer| write_one(out, answer))?;
     let requests: Vec<_> = answers.iter().filter_map(|answer| answer.requests).collect();
     let episodes: usize = answers.iter().map(|answer| answer.episodes.len()).sum();
     let sent: u64 = requests.iter().map(|requests| requests.at_most).sum();
@@ -153,7 +153,7 @@ pub(crate) fn tell_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> 
     writeln!(out, "; about {}, one model after the other", time(requests.iter().map(|requests| requests.seconds).sum()))
 }
 
-pub(crate) fn tell(out: &mut impl io::Write, answer: &ForecastAnswer) -> io::Result<()> {
+pub(crate) fn write_one(out: &mut impl io::Write, answer: &ForecastAnswer) -> io::Result<()> {
     let (to_do, steps) = (counted(answer.episodes.len() as u64, "episode"), counted(answer.steps_at_most, "step"));
     write!(out, "{}: would record {to_do}, at most {steps}", visible(&answer.model))?;
     match answer.found {
@@ -175,23 +175,21 @@ pub(crate) fn tell(out: &mut impl io::Write, answer: &ForecastAnswer) -> io::Res
     };
     let (count, time) = (counted(requests.typical_requests, "request"), time(requests.seconds));
     writeln!(out, "typical: {count}, about {time}, {basis}")?;
-    let RequestForecast { prompt_cost_usd, typical_cost_usd, cost_usd_at_most, .. } = *requests;
-    match (prompt_cost_usd, typical_cost_usd, cost_usd_at_most) {
+    let cost = match (requests.prompt_cost_usd, requests.typical_cost_usd, requests.cost_usd_at_most) {
         (_, Some(typical), Some(most)) => {
-            writeln!(out, "cost: typical {}, at most {} with the longest replies", dollars(typical), dollars(most))
+            format!("typical {}, at most {} with the longest replies", dollars(typical), dollars(most))
         }
-        (_, Some(typical), None) => writeln!(
-            out,
-            "cost: typical {}, at most unknown: the model has no prices; --models FILE gives them",
-            dollars(typical)
-        ),
-        (Some(prompt), None, _) => writeln!(
-            out,
-            "cost: about {} for the requests, unknown for the replies: the model has no output price; --models FILE gives it",
-            dollars(prompt)
-        ),
-        _ => writeln!(out, "cost: unknown, the model has no price for requests; --models FILE gives prices"),
-    }
+        (_, Some(typical), None) => {
+            let why = "the model has no prices; --models FILE gives them";
+            format!("typical {}, at most unknown: {why}", dollars(typical))
+        }
+        (Some(prompt), None, _) => {
+            let why = "the model has no output price; --models FILE gives it";
+            format!("about {} for the requests, unknown for the replies: {why}", dollars(prompt))
+        }
+        _ => "unknown, the model has no price for requests; --models FILE gives prices".to_owned(),
+    };
+    writeln!(out, "cost: {cost}")
 }
 
 fn time(seconds: f64) -> String {

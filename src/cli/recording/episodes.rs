@@ -26,7 +26,7 @@ impl Episodes {
         let planned = plan.keys();
         let mut todo = Vec::with_capacity(planned.len());
         for experiment in &plan.experiments {
-            let done = recorded(experiment).map_err(Failure::input)?;
+            let done = recorded(experiment)?;
             let own = planned.iter().filter(|key| key.experiment == *experiment);
             todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))).cloned());
         }

@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::cli::args::one_of;
 use crate::cli::{Failure, output};
 use mirrorstats_agents::human::Human;
 use mirrorstats_agents::human::design::{Design, Schedule};
@@ -34,7 +35,7 @@ pub struct HumanArgs {
     participants: Vec<String>,
     /// Who plays what: split, each episode is played by one participant; crossed, everyone plays every scene; own-seeds,
     /// everyone plays --seeds seeds of their own
-    #[arg(long, value_name = "DESIGN", default_value = "split", value_parser = design)]
+    #[arg(long, value_name = "DESIGN", default_value = "split", hide_possible_values = true, value_parser = one_of(&Design::ALL, Design::name))]
     design: Design,
     /// A text that participants agree to before they begin
     #[arg(long, value_name = "FILE")]
@@ -146,10 +147,6 @@ fn enrol(journal: &ParticipantJournal, code: &str, place: usize) -> io::Result<S
     let token = mirrorstats_web::new_token()?;
     journal.enrol(code, place, &token)?;
     Ok(token)
-}
-
-fn design(text: &str) -> Result<Design, String> {
-    Design::named(text).ok_or_else(|| format!("expected {}", Design::ALL.map(Design::name).join(", ")))
 }
 
 /// Parses a code, which is not a name: letters, digits, `-` and `_`.

@@ -80,9 +80,8 @@ pub struct Recorded {
 }
 
 fn unreadable(counts: &ReplyCounts) -> Option<String> {
-    let (bad, all) = (counts.all_unreadable(), counts.replies);
-    let noun = if all == 1 { "reply" } else { "replies" };
-    (bad > 0).then(|| format!("{bad} of {all} {noun} could not be read: {counts}"))
+    let (bad, all) = (counts.all_unreadable(), counted(counts.replies, "reply"));
+    (bad > 0).then(|| format!("{bad} of {all} could not be read: {counts}"))
 }
 
 fn spent(spend: &Spend) -> String {

@@ -8,7 +8,7 @@ use mirrorstats_exact::format::counted;
 use mirrorstats_vlm::probe::{ProbeAnswer, ProbedParameter};
 use mirrorstats_vlm::provider::rate_limit::RateLimit;
 
-pub(crate) fn tell(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result<()> {
+pub(crate) fn write(out: &mut impl io::Write, answer: &ProbeAnswer) -> io::Result<()> {
     let (model, id) = (visible(&answer.model), visible(&answer.id));
     let requests = counted(u64::from(answer.requests), "request");
     match &answer.fault {

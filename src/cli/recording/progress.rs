@@ -1,13 +1,9 @@
 //! The progress of a recording on standard error.
 
 use std::collections::BTreeMap;
-use std::fmt;
 use std::io::{self, IsTerminal as _, Write as _};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
-
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use super::player::AnyPlayer;
 use super::{spent, unreadable};
@@ -21,19 +17,27 @@ use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::Step;
 
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
+const BETWEEN_UPDATES: Duration = Duration::from_millis(100);
+/// Returns to the start of the terminal's line and empties it.
+const CLEAR: &str = "\r\x1b[2K";
 
-/// The steps of ended episodes, and the most that they could have had.
-#[derive(Debug, Default)]
-struct Used {
+/// The steps and episodes of this start so far.
+#[derive(Debug)]
+struct Counts {
     steps: u64,
+    ended: usize,
+    /// The steps of ended episodes, and the most that they could have had.
+    used: u64,
     budget: u64,
+    shown: Instant,
 }
 
-impl Used {
-    /// The expected steps of a budget, if all episodes end as early as those that have ended.
-    fn expected(&self, planned: u64) -> u64 {
-        let expected = u128::from(planned) * u128::from(self.steps) / u128::from(self.budget.max(1));
-        u64::try_from(expected).unwrap_or(u64::MAX)
+impl Counts {
+    /// The steps of all episodes, if they end as early as those that have ended. `None` before one has: nobody knows
+    /// how long an episode takes.
+    fn expected(&self, planned: u64) -> Option<u64> {
+        let expected = u128::from(planned) * u128::from(self.used) / u128::from(self.budget.max(1));
+        (self.ended > 0).then(|| u64::try_from(expected).unwrap_or(u64::MAX).max(self.steps))
     }
 }
 
@@ -42,127 +46,116 @@ fn rate(per_second: f64) -> String {
     if is_known { format!(", {} a second", fixed(Some(per_second), 1)) } else { String::new() }
 }
 
-fn time_left(left: Duration) -> String {
-    match left.as_secs() {
-        seconds @ 0..60 => format!(", about {seconds} s left"),
-        seconds => format!(", about {} min left", seconds.div_ceil(60)),
+fn time_left(seconds: u64) -> String {
+    match seconds {
+        0..60 => format!(", about {seconds} s left"),
+        _ => format!(", about {} min left", seconds.div_ceil(60)),
     }
 }
 
-/// The progress: a bar on a terminal. Otherwise occasional lines, for agents that wait for a provider or a program, or
-/// whose replies are unreadable.
+/// The progress: one line on a terminal. Otherwise occasional lines, for agents that wait for a provider or a program,
+/// or whose replies are unreadable.
 pub(crate) struct Bar<'a> {
-    line: ProgressBar,
     player: &'a AnyPlayer,
     subject: &'a Subject,
     episodes: usize,
     /// The steps of all episodes at most.
     planned: u64,
-    ended: AtomicUsize,
     replies: Replies,
     budget: BTreeMap<Experiment, u64>,
-    used: Mutex<Used>,
-    /// True once an episode has ended: before, nobody knows how long one takes.
-    known: Arc<AtomicBool>,
-    is_shown: bool,
-    told: Mutex<Instant>,
+    start: Instant,
+    counts: Mutex<Counts>,
+    is_terminal: bool,
 }
 
 impl<'a> Bar<'a> {
     pub(crate) fn new(player: &'a AnyPlayer, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
         let steps_of = |key: &Key| u64::from(world.for_experiment(&key.experiment).episode.steps);
-        let budget: BTreeMap<Experiment, u64> =
-            todo.iter().map(|key| (key.experiment.clone(), steps_of(key))).collect();
-        let planned = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
-        let episodes = todo.len();
-        let is_shown = io::stderr().is_terminal();
-        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let line = ProgressBar::with_draw_target(Some(planned), target);
-        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps{rate}{left}");
-        let (ended, known) = (AtomicUsize::new(0), Arc::new(AtomicBool::new(false)));
-        let is_known = Arc::clone(&known);
-        let style = style.unwrap_or_else(|_| ProgressStyle::default_bar());
-        let style = style.with_key("rate", |state: &ProgressState, out: &mut dyn fmt::Write| {
-            let _ = out.write_str(&rate(state.per_sec()));
-        });
-        line.set_style(style.with_key("left", move |state: &ProgressState, out: &mut dyn fmt::Write| {
-            let left = is_known.load(Ordering::Relaxed).then(|| state.eta());
-            let _ = out.write_str(&left.map_or_else(String::new, time_left));
-        }));
-        let told = Mutex::new(Instant::now());
-        let (replies, used) = (Replies::default(), Mutex::default());
-        let bar =
-            Self { line, player, subject, episodes, planned, ended, replies, budget, used, known, is_shown, told };
-        bar.line.set_message(bar.message());
-        bar
+        let start = Instant::now();
+        Self {
+            player,
+            subject,
+            episodes: todo.len(),
+            planned: todo.iter().map(steps_of).sum(),
+            replies: Replies::default(),
+            budget: todo.iter().map(|key| (key.experiment.clone(), steps_of(key))).collect(),
+            start,
+            counts: Mutex::new(Counts { steps: 0, ended: 0, used: 0, budget: 0, shown: start }),
+            is_terminal: io::stderr().is_terminal(),
+        }
+    }
+
+    fn counts(&self) -> MutexGuard<'_, Counts> {
+        self.counts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(crate) fn clear(&self) {
-        self.line.finish_and_clear();
+        if self.is_terminal {
+            let _ = write!(io::stderr(), "{CLEAR}");
+        }
     }
 
     /// The steps played by this start, those of unfinished episodes too.
     pub(crate) fn steps(&self) -> u64 {
-        self.line.position()
+        self.counts().steps
     }
 
     pub(crate) fn replies(&self) -> RepliesAnswer {
         self.replies.answer()
     }
 
-    fn message(&self) -> String {
+    fn message(&self, counts: &Counts) -> String {
         let unreadable = unreadable(&self.replies.counts()).map_or_else(String::new, |words| format!(", {words}"));
         let spent = self.player.spend().map_or_else(String::new, |spend| format!(", {}", spent(&spend)));
-        format!("{} of {} episodes{unreadable}{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
+        format!("{} of {} episodes{unreadable}{spent}", counts.ended, self.episodes)
     }
 
     fn say(&self, line: &str) {
-        self.line.suspend(|| {
-            // If standard error is closed, the message cannot be shown.
-            let _ = writeln!(io::stderr(), "{line}");
-        });
+        self.clear();
+        // If standard error is closed, the message cannot be shown.
+        let _ = writeln!(io::stderr(), "{line}");
     }
 
     fn has_news(&self) -> bool {
         self.player.player().waits() || self.replies.counts().all_unreadable() > 0
     }
 
-    fn write_line(&self) {
-        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.is_shown || told.elapsed() < BETWEEN_LINES || !self.has_news() {
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "for people"
+    )]
+    fn show(&self, counts: &mut Counts) {
+        let between = if self.is_terminal { BETWEEN_UPDATES } else { BETWEEN_LINES };
+        if counts.shown.elapsed() < between || !(self.is_terminal || self.has_news()) {
             return;
         }
-        *told = Instant::now();
-        let (message, steps, rate) = (self.message(), self.line.position(), rate(self.line.per_sec()));
-        let is_known = self.known.load(Ordering::Relaxed);
-        let left = if is_known { time_left(self.line.eta()) } else { String::new() };
-        // If standard error is closed, the message cannot be shown.
-        let _ = writeln!(io::stderr(), "{message}, {steps} steps{rate}{left}");
+        counts.shown = Instant::now();
+        let per_second = counts.steps as f64 / self.start.elapsed().as_secs_f64();
+        let left = counts.expected(self.planned).filter(|_| counts.steps > 0);
+        let left =
+            left.map(|all| ((all - counts.steps) as f64 / per_second) as u64).map_or_else(String::new, time_left);
+        let line = format!("{}, {} steps{}{left}", self.message(counts), counts.steps, rate(per_second));
+        let _ = if self.is_terminal { write!(io::stderr(), "{CLEAR}{line}") } else { writeln!(io::stderr(), "{line}") };
     }
 }
 
 impl Progress for Bar<'_> {
     fn step(&self, episode: &Key, t: i32, row: &Step) {
-        self.line.inc(1);
         if let Some(first) = self.replies.add(self.subject, episode, t, row) {
             self.say(&format!("a reply could not be read: {}: {}", first.status, first.words()));
         }
-        if self.is_shown {
-            self.line.set_message(self.message());
-        } else {
-            self.write_line();
-        }
+        let mut counts = self.counts();
+        counts.steps += 1;
+        self.show(&mut counts);
     }
 
     fn episode(&self, key: &Key, _: &str, steps: usize) {
-        self.ended.fetch_add(1, Ordering::Relaxed);
-        let budget = self.budget.get(&key.experiment).copied().unwrap_or_default();
-        let mut used = self.used.lock().unwrap_or_else(PoisonError::into_inner);
-        used.steps += steps as u64;
-        used.budget += budget;
-        self.line.set_length(used.expected(self.planned).max(self.line.position()));
-        self.known.store(true, Ordering::Relaxed);
-        self.line.set_message(self.message());
+        let mut counts = self.counts();
+        counts.ended += 1;
+        counts.used += steps as u64;
+        counts.budget += self.budget.get(&key.experiment).copied().unwrap_or_default();
     }
 
     fn model_changed(&self, id: &str, t: i32, before: &str, after: &str) {
@@ -205,12 +198,12 @@ mod tests {
         };
         let key = Key::first(Experiment::E1, 1, 1);
         bar.step(&key, 1, &row("ok"));
-        assert_eq!((bar.message().as_str(), bar.has_news()), ("0 of 2 episodes", false));
+        assert_eq!((bar.message(&bar.counts()).as_str(), bar.has_news()), ("0 of 2 episodes", false));
         for (t, status) in [(2, "refusal"), (3, "parse_failed"), (4, "refusal")] {
             bar.step(&key, t, &row(status));
         }
         let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
-        assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
+        assert_eq!((bar.message(&bar.counts()).as_str(), bar.has_news()), (expected, true));
     }
 
     #[test]
@@ -219,13 +212,13 @@ mod tests {
         let subject = Subject::for_model("frozen");
         let todo = [1, 2, 3, 4].map(|run| Key::first(Experiment::E1, 1, run));
         let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
-        let all = bar.line.length().unwrap();
-        bar.line.inc(all / 20);
+        let all = bar.planned;
+        assert_eq!(bar.counts().expected(all), None);
         bar.episode(&todo[0], "", usize::try_from(all / 20).unwrap());
-        assert_eq!(bar.line.length(), Some(all / 5));
+        assert_eq!(bar.counts().expected(all), Some(all / 5));
         assert_eq!([rate(2.7208), rate(0.0), rate(f64::NAN)], [", 2.7 a second", "", ""]);
-        assert_eq!(time_left(Duration::from_secs(59)), ", about 59 s left");
-        assert_eq!(time_left(Duration::from_secs(61)), ", about 2 min left");
+        assert_eq!(time_left(59), ", about 59 s left");
+        assert_eq!(time_left(61), ", about 2 min left");
     }
 
     #[test]

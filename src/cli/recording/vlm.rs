@@ -15,18 +15,11 @@ use mirrorstats_experiment::Spec;
 use mirrorstats_record::plan::slug;
 use mirrorstats_trace::footers::model_id::OWN_SERVER;
 use mirrorstats_vlm::Vlm;
-use mirrorstats_vlm::limits::Spend;
-use mirrorstats_vlm::limits::{Account, Limits};
-use mirrorstats_vlm::models::{Choice, Models, ModelsError};
+use mirrorstats_vlm::limits::{Account, Limits, Spend};
+use mirrorstats_vlm::models::{Choice, Models};
 use mirrorstats_vlm::probe::{ProbeAnswer, probe};
 use mirrorstats_vlm::provider::{Patience, Provider, check_transport};
 use mirrorstats_vlm::wire_format::{Effort, WireFormat};
-
-/// A service tier.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Tier {
-    Flex,
-}
 
 /// A model, who serves it, and what a recording with it may spend.
 #[derive(Clone, Debug, clap::Args)]
@@ -74,8 +67,8 @@ pub struct VlmArgs {
     #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
     attempts: u32,
     /// A service tier at half the price: flex of OpenAI and Google, whose answers take minutes
-    #[arg(long, value_name = "flex", value_enum)]
-    tier: Option<Tier>,
+    #[arg(long, value_name = "flex", value_parser = ["flex"])]
+    tier: Option<String>,
     /// Seconds for one answer [default: 180, or 900 with --tier flex]
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..=3_600))]
     timeout: Option<u64>,
@@ -112,7 +105,7 @@ impl VlmArgs {
         // A router reports the cost of an answer; for others it is unknown without prices.
         let may_say = choice.backend.wire_format == WireFormat::OpenaiCompatible && choice.model.backend != OWN_SERVER;
         if self.max_cost.is_some() && !may_say {
-            choice.check_prices().map_err(Failure::input)?;
+            choice.check_prices()?;
         }
         let network = network()?;
         let provider = self.provider(&choice, in_flight.map_or(IN_FLIGHT, NonZeroUsize::get))?;
@@ -126,7 +119,7 @@ impl VlmArgs {
             journals,
             Arc::new(Account::new(limits, Spend::default())),
         );
-        vlm.count_spent(&slug).map_err(Failure::input)?;
+        vlm.count_spent(&slug)?;
         Ok(VlmPlayer { vlm: Arc::new(vlm), in_flight: IN_FLIGHT, network: Some(network) })
     }
 
@@ -152,12 +145,9 @@ impl VlmArgs {
         let Some(name) = self.name() else {
             return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
         };
-        let models = Models::load(self.models.as_deref()).map_err(|error| match error {
-            ModelsError::Faults(faults) => Failure::Faults(faults),
-            error => Failure::input(error),
-        })?;
+        let models = Models::load(self.models.as_deref())?;
         let backend = self.backend.as_deref().or(self.base_url.is_some().then_some(OWN_SERVER));
-        let mut choice = models.choose(name, backend).map_err(Failure::input)?;
+        let mut choice = models.choose(name, backend)?;
         if !choice.is_known && choice.model.backend != OWN_SERVER {
             output::say(&format!(
                 "warning: no file of models has `{}`: its prices are not known, and it is asked with the temperature of the paper; \
@@ -169,7 +159,7 @@ impl VlmArgs {
             choice.backend.base_url = Some(url.clone());
         }
         if self.tier.is_some() {
-            choice.use_flex_tier().map_err(Failure::input)?;
+            choice.use_flex_tier()?;
         }
         choice.model.accepted.clone_from(&self.accept_model);
         choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
@@ -189,7 +179,7 @@ impl VlmArgs {
             (Err(missing), _) => return Err(Failure::input(missing)),
         };
         if secret.is_some() {
-            check_transport(url, &choice.backend).map_err(Failure::input)?;
+            check_transport(url, &choice.backend)?;
         }
         let patience = Patience {
             attempts: self.attempts,

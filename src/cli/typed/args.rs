@@ -1,10 +1,10 @@
 //! Arguments that several commands share.
 
 use std::ffi::OsString;
-use std::num::{NonZeroU32, NonZeroUsize};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use mirrorstats_engines::spark::setting::Setting;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// The traces to read.
 #[derive(Clone, Debug, clap::Args)]
@@ -68,40 +68,14 @@ pub enum LostArg {
     AsFailure,
 }
 
-/// The engine of the episode table.
-#[derive(Clone, Debug, Default, clap::Args)]
-pub struct EngineArgs {
-    /// The engine of the scores; the result is the same
-    #[arg(long, value_enum, default_value_t)]
-    pub engine: Engine,
-    #[command(flatten)]
-    pub spark: SparkArgs,
-}
-
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Engine {
-    /// The program's own kernels
-    #[default]
-    Native,
-    /// The SQL statement of `mirrorstats definitions sql` on your own Spark: `SPARK_HOME`, `spark-submit` on PATH, or Python's package `pyspark`
-    Spark,
-}
-
-/// The options for submitting to Spark.
-#[derive(Clone, Debug, Default, clap::Args)]
-pub struct SparkArgs {
-    /// The master of --engine spark: spark://HOST:PORT, yarn, local, ... [default: what your Spark is configured for]
-    #[arg(long, value_name = "URL")]
-    pub master: Option<String>,
-    /// A setting for --engine spark; may be repeated
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub spark_conf: Vec<Setting>,
-    /// Give up on Spark after this many seconds [default: never]
-    #[arg(long, value_name = "SECONDS")]
-    pub spark_timeout: Option<NonZeroU32>,
-    /// Keep Spark's own log in this file
-    #[arg(long, value_name = "FILE")]
-    pub spark_log: Option<PathBuf>,
+/// Parses the name of one of some values.
+pub fn one_of<T: Copy + Send + Sync + 'static>(
+    all: &'static [T],
+    name: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.iter().map(|value| name(*value))).map(move |typed: String| {
+        *all.iter().find(|value| name(**value) == typed).expect("only these names are possible")
+    })
 }
 
 /// Parses a number of an option.

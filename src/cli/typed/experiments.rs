@@ -6,7 +6,7 @@ use std::path::Path;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
 use crate::cli::Failure;
-use mirrorstats_experiment::file::{self, FileError, Loaded};
+use mirrorstats_experiment::file::{self, Loaded};
 #[cfg(feature = "sim")]
 use {
     mirrorstats_experiment::Experiment,
@@ -22,10 +22,7 @@ pub fn parser() -> impl TypedValueParser<Value = Experiments> {
 }
 
 pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
-    file::load(path).map_err(|error| match error {
-        FileError::Faults(faults) => Failure::Faults(faults),
-        unreadable @ FileError::Unreadable { .. } => Failure::input(unreadable),
-    })
+    Ok(file::load(path)?)
 }
 
 /// The experiments of a file, each placed in a room.

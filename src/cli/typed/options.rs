@@ -16,7 +16,7 @@ pub fn options_of<A: clap::Args>(verb: &str, options: &Options) -> Result<A, Fai
     let command = A::augment_args(clap::Command::new(name.clone()).bin_name(&name).no_binary_name(true));
     let words = options.iter().flat_map(|(key, value)| words(key, value));
     let parsed = command.try_get_matches_from(words).and_then(|matches| A::from_arg_matches(&matches));
-    parsed.map_err(|error| Failure::input(told(&error)))
+    parsed.map_err(|error| Failure::input(message(&error)))
 }
 
 pub fn option_names<A: clap::Args>() -> Vec<String> {
@@ -24,7 +24,7 @@ pub fn option_names<A: clap::Args>() -> Vec<String> {
     command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
 }
 
-fn told(error: &clap::Error) -> String {
+fn message(error: &clap::Error) -> String {
     let context = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.clone()),
         Some(ContextValue::Strings(texts)) => texts.first().cloned(),

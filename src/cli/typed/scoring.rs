@@ -5,15 +5,18 @@ use std::ffi::OsString;
 use std::io;
 use std::path::Path;
 
-use crate::cli::args::{Engine, EngineArgs, GroupingArgs, LostArg, ScoringArgs, SparkArgs, TraceArgs};
+use crate::cli::args::{GroupingArgs, LostArg, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, NAME, output};
 use mirrorstats_analysis::plan::register::RegisteredPlan;
-use mirrorstats_engines::spark::Cluster;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::input;
 use mirrorstats_report::html;
-use mirrorstats_study::{Backend, LostAs, Question, ScoredAlike, Study, StudyError, resolve};
+use mirrorstats_study::inputs::resolve;
+use mirrorstats_study::losses::LostAs;
+use mirrorstats_study::own_definitions::ScoredAlike;
+use mirrorstats_study::question::Question;
+use mirrorstats_study::{Study, StudyError};
 use mirrorstats_trace::inputs::Input;
 
 impl TraceArgs {
@@ -34,43 +37,6 @@ impl TraceArgs {
         output::notes(study.carried_note().as_slice());
         Ok(study)
     }
-
-    /// Like [`TraceArgs::study`], scored by the requested engine.
-    pub fn study_on(
-        &self,
-        engine: &EngineArgs,
-        scoring: &ScoringArgs,
-        grouping: &GroupingArgs,
-    ) -> Result<Study, Failure> {
-        let backend = engine.backend()?;
-        Ok(self.study(scoring, grouping)?.backend(backend))
-    }
-}
-
-impl EngineArgs {
-    pub fn backend(&self) -> Result<Backend, Failure> {
-        self.check()?;
-        Ok(match self.engine {
-            Engine::Native => Backend::Native,
-            Engine::Spark => Backend::Spark(self.cluster()),
-        })
-    }
-
-    pub fn cluster(&self) -> Cluster {
-        let SparkArgs { master, spark_conf, spark_timeout, spark_log } = self.spark.clone();
-        Cluster { master, settings: spark_conf, timeout_s: spark_timeout, log: spark_log }
-    }
-
-    fn check(&self) -> Result<(), Failure> {
-        let SparkArgs { master, spark_conf, spark_timeout, spark_log } = &self.spark;
-        let typed = master.is_some() || !spark_conf.is_empty() || spark_timeout.is_some() || spark_log.is_some();
-        if self.engine == Engine::Spark || !typed {
-            return Ok(());
-        }
-        Err(Failure::Rendered(
-            "error: --master and --spark-... are words for Spark\n  help: add --engine spark".to_owned(),
-        ))
-    }
 }
 
 impl ScoringArgs {
@@ -86,18 +52,6 @@ impl ScoringArgs {
                 LostArg::AsFailure => LostAs::Failure,
             },
             ..Question::default()
-        }
-    }
-}
-
-impl From<StudyError> for Failure {
-    fn from(error: StudyError) -> Self {
-        match error.into_io() {
-            Ok(error) => Self::Output(error),
-            Err(error) => match error.faults() {
-                Some(faults) => Self::Faults(faults.clone()),
-                None => Self::input(error),
-            },
         }
     }
 }

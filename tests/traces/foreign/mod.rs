@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use arrow::util::display::array_value_to_string;
 use mirrorstats::{Study, StudyError};
 use mirrorstats_score::format::Format;
-use mirrorstats_study::write_scores;
+use mirrorstats_study::scores;
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::footers::checksums::Checksums;
 use mirrorstats_trace::inputs::Input;
@@ -82,7 +82,7 @@ fn scores(path: &Path) -> Result<Vec<Vec<String>>, Box<StudyError>> {
 fn scores_by(path: &Path, definitions: &str) -> Result<Vec<Vec<String>>, Box<StudyError>> {
     let table = Study::open([path])?.definitions(definitions)?.score()?.episodes;
     let mut bytes = Vec::new();
-    write_scores(&table, Format::Csv, &mut bytes, NonZeroUsize::MIN).unwrap();
+    scores::write(&table, Format::Csv, &mut bytes, NonZeroUsize::MIN).unwrap();
     Ok(score_values(&String::from_utf8(bytes).unwrap()))
 }
 

@@ -174,8 +174,6 @@ pub struct Played {
     pub value: i64,
     /// The timesteps that decided it, ascending; null where the side is scores.
     pub timesteps: Option<Vec<i64>>,
-    /// The link to its frames in a page that `view --export` wrote next to the trace; null without one.
-    pub frames: Option<String>,
 }
 
 /// The pairs of episodes whose values differ, matched by scene in order, or by id if no scenes are declared. Empty for
@@ -195,7 +193,7 @@ pub(super) fn flips(study: &Study, column: &MetricColumn, [base, new]: [&Block; 
     };
     let played = |row: usize| {
         let value = column.get(row)?;
-        Some(Played { episode_id: id(row).to_owned(), value, timesteps: None, frames: None })
+        Some(Played { episode_id: id(row).to_owned(), value, timesteps: None })
     };
     let flipped = pairs.into_iter().filter_map(|(old, later)| {
         let (base, new) = (played(old)?, played(later)?);

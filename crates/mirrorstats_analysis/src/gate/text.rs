@@ -176,15 +176,14 @@ fn side(side: GateSide) -> String {
     counted + &lost
 }
 
-/// `E1/ant/s1/r2 1 (step 4) -> E1/ant/s1/r2 0 (step 7)`, with the location of the frames.
+/// `E1/ant/s1/r2 1 (step 4) -> E1/ant/s1/r2 0 (step 7)`.
 fn words(flip: &FlippedPair) -> String {
     let played = |played: &Played| {
         let steps = played.timesteps.as_ref().filter(|steps| !steps.is_empty()).map_or_else(String::new, |steps| {
             let noun = if steps.len() == 1 { "step" } else { "steps" };
             format!(" ({noun} {})", steps.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))
         });
-        let frames = played.frames.as_ref().map_or_else(String::new, |frames| format!(" [{frames}]"));
-        format!("{} {}{steps}{frames}", played.episode_id, played.value)
+        format!("{} {}{steps}", played.episode_id, played.value)
     };
     format!("{} -> {}", played(&flip.base), played(&flip.new))
 }

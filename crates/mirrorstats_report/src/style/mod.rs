@@ -194,7 +194,7 @@ pub enum StyleError {
     Unknown { name: String, hint: String },
     #[error("style {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error(transparent)]
+    #[error("{0}")]
     Faults(#[from] Faults),
 }
 

@@ -27,7 +27,7 @@ use mirrorstats_trace::beside::labels;
 pub enum SelectError {
     #[error(transparent)]
     Metric(#[from] UnknownMetric),
-    #[error(transparent)]
+    #[error("{0}")]
     Condition(#[from] Faults),
     #[error(transparent)]
     Engine(#[from] EngineError),

@@ -277,7 +277,7 @@ pub struct EpisodeConfig {
 pub enum ConfigError {
     #[error("world configuration {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error(transparent)]
+    #[error("{0}")]
     Faults(#[from] Faults),
 }
 

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::{Snapshot, ViewError};
 use mirrorstats_analysis::changes::Flip;
 use mirrorstats_exact::escape::visible;
-use mirrorstats_study::{DiffRequest, Side, diff};
+use mirrorstats_study::diff::{DiffRequest, Side, diff};
 
 pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let options = &snapshot.options;

@@ -12,7 +12,9 @@ use crate::{Snapshot, ViewError};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_log::frames::Moment;
 use mirrorstats_score::evidence::{Evidence, MetricEvidence, ranges};
-use mirrorstats_study::{Question, Study};
+use mirrorstats_study::Study;
+use mirrorstats_study::explain::{explain_each_in, explain_in};
+use mirrorstats_study::question::Question;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::episodes::moments::moments;
 use mirrorstats_trace::inputs::Input;
@@ -190,9 +192,9 @@ fn lines(text: &str) -> String {
 pub(crate) fn scores(snapshot: &Snapshot, opened: &Opened) -> Result<(Value, Value), ViewError> {
     let (Some(scored), Some(input)) = (&snapshot.scored, &opened.input) else { return Ok((json!([]), Value::Null)) };
     let id = &opened.episode.episode_id;
-    let own = entry(&scored.study.explain_in(input, id)?);
+    let own = entry(&explain_in(&scored.study, input, id)?);
     let Some(study) = other_study(snapshot, input)? else { return Ok((own, Value::Null)) };
-    Ok((own, entry(&study.explain_in(input, id)?)))
+    Ok((own, entry(&explain_in(&study, input, id)?)))
 }
 
 /// The same for some episodes of a trace, by id.
@@ -201,9 +203,9 @@ pub(crate) fn scores_of(
     input: &Input,
     ids: &BTreeSet<String>,
 ) -> Result<BTreeMap<String, (Value, Value)>, ViewError> {
-    let own = snapshot.table()?.study.explain_each_in(input, ids)?;
+    let own = explain_each_in(&snapshot.table()?.study, input, ids)?;
     let other = match other_study(snapshot, input)? {
-        Some(study) => study.explain_each_in(input, ids)?,
+        Some(study) => explain_each_in(&study, input, ids)?,
         None => BTreeMap::new(),
     };
     let against = |id: &String| other.get(id).map_or(Value::Null, entry);

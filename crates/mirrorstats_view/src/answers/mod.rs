@@ -12,7 +12,7 @@ mod verdict;
 
 use crate::filter::{Query, number, required};
 use crate::{Snapshot, View, ViewError, export};
-use mirrorstats_study::Part;
+use mirrorstats_study::overview::Part;
 
 pub(super) enum Answer {
     Json(Vec<u8>),

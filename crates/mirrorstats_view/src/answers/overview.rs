@@ -13,7 +13,9 @@ use mirrorstats_exact::format::fixed;
 use mirrorstats_report::html;
 use mirrorstats_score::tables::select::is_of_coders;
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
-use mirrorstats_study::{ModelMean, Outputs, Overview, Part, Question, model_means};
+use mirrorstats_study::overview::{Overview, Part, overview};
+use mirrorstats_study::question::Question;
+use mirrorstats_study::results::{ModelMean, Outputs, model_means};
 use mirrorstats_trace::episodes::palette::Color;
 
 pub(crate) fn study(snapshot: &Snapshot) -> Value {
@@ -117,7 +119,7 @@ pub(crate) fn sections(snapshot: &Snapshot, query: &Query, part: Part) -> Result
                 return Ok(empty(snapshot));
             }
             order = ranking(&results.episodes);
-            scored.study.overview(results, &snapshot.options.style, part)?
+            overview(&scored.study, results, &snapshot.options.style, part)?
         }
         // Figures need timelines, which require a scan.
         Part::Figures | Part::Statistics => scanned(snapshot, scored, &filter, part)?,
@@ -139,7 +141,7 @@ fn scanned(snapshot: &Snapshot, scored: &Scored, filter: &Filter, part: Part) ->
     let study = Scored::study(options, scored.inputs.clone(), question)?;
     let figures = if part == Part::Figures { mirrorstats_figures::FigureName::ALL.as_slice() } else { &[] };
     let outputs = Outputs { losses: true, ..Outputs::of_figures(figures) };
-    Ok(study.overview(study.scan(outputs)?, &options.style, part)?)
+    Ok(overview(&study, study.scan(outputs)?, &options.style, part)?)
 }
 
 fn empty(snapshot: &Snapshot) -> Value {

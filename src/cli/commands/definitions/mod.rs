@@ -16,7 +16,6 @@ use mirrorstats_exact::suggest::nearest;
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_metric::file::{FileError, built_in, built_in_names};
 use mirrorstats_score::vocabulary;
-use mirrorstats_study::StudyError;
 use mirrorstats_toml_spec::FaultRecord;
 use mirrorstats_trace::inputs;
 use mirrorstats_trace::read::open::TraceSet;
@@ -94,8 +93,8 @@ fn check(file: &Path, traces: &[OsString], json: bool) -> Result<Outcome, Failur
     let columns = if traces.is_empty() {
         vocabulary::schema_columns()
     } else {
-        let inputs = inputs::resolve(traces, io::stdin().lock()).map_err(Failure::input)?;
-        vocabulary::trace_columns(&TraceSet::open(&inputs).map_err(Failure::input)?)
+        let inputs = inputs::resolve(traces, io::stdin().lock())?;
+        vocabulary::trace_columns(&TraceSet::open(&inputs)?)
     };
     match Definitions::load(file, &columns) {
         Ok(definitions) if json => {
@@ -120,12 +119,12 @@ fn check(file: &Path, traces: &[OsString], json: bool) -> Result<Outcome, Failur
             output::print_json(&CheckAnswer { ok: false, hash: None, metrics: vec![], faults: faults.records() })?;
             Err(Failure::Faults(faults))
         }
-        Err(error) => Err(StudyError::from(error).into()),
+        Err(error) => Err(error.into()),
     }
 }
 
 fn explain(metric: &str, definitions: &Path, json: bool) -> Result<Outcome, Failure> {
-    let definitions = Definitions::load(definitions, &vocabulary::schema_columns()).map_err(StudyError::from)?;
+    let definitions = Definitions::load(definitions, &vocabulary::schema_columns())?;
     if let Some(explanation) = definitions.explain(metric) {
         return output::print(&explanation, json);
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::replace::Content;
-use mirrorstats_study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
+use mirrorstats_study::sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, sensitivity};
 
 /// Show how every cell depends on the threshold of mirror evidence, and where a conclusion changes
 ///
@@ -37,12 +37,11 @@ const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex
 impl SensitivityArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let mut targets = self.out.iter().flat_map(|out| TABLES.map(|name| out.join(name)));
-        targets.try_for_each(|path| output::check_target(&path, study.files_read(None)))?;
         if let Some(out) = &self.out {
+            TABLES.iter().try_for_each(|name| output::check_target(&out.join(name), study.files_read(None)))?;
             study.check_out(out)?;
         }
-        let report = study.sensitivity(&self.thresholds)?;
+        let report = sensitivity(&study, &self.thresholds)?;
         output::notes(&report.notes);
         if let Some(out) = &self.out {
             write(out, &report)?;

@@ -50,7 +50,7 @@ impl SqlArgs {
             let study = Study::open(self.traces.clone())?;
             question.resolved(study.traces()?)?.bind_to(&trace_columns(study.traces()?))?
         };
-        let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
+        let statement = sql::lower(&definitions.plan, self.dialect.into())?;
         output::plain(statement)
     }
 }

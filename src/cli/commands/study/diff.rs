@@ -8,7 +8,8 @@ use crate::cli::args::ThreadArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::changes::Changes;
 use mirrorstats_score::cells::group::DEFAULT_BY;
-use mirrorstats_study::{DiffRequest, Side, diff, resolve};
+use mirrorstats_study::diff::{DiffRequest, Side, diff};
+use mirrorstats_study::inputs::resolve;
 
 /// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
 #[derive(Clone, Debug, clap::Args)]

@@ -2,12 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-
-use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_figures::{FigureFormat, FigureName, FigureWidth};
-use mirrorstats_study::{FigureOptions, MANY_MODELS};
+use mirrorstats_study::figure::{FigureOptions, MANY_MODELS, figure};
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
@@ -20,8 +18,6 @@ pub struct FigureArgs {
     pub traces: TraceArgs,
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    #[command(flatten)]
-    pub engine: EngineArgs,
     /// The style that orders the models: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: PathBuf,
@@ -34,10 +30,7 @@ pub struct FigureArgs {
     /// Draw only the best N models, by the mean of the first metric over all experiments [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub top: Option<u16>,
-    /// The file format [default: by the ending of FILE; svg on standard output]
-    #[arg(long, value_parser = formats())]
-    pub format: Option<FigureFormat>,
-    /// The file to write [default: standard output]
+    /// The file to write: .svg, .png or .pdf [default: SVG on standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Allow episodes with different settings in one cell
@@ -48,51 +41,22 @@ pub struct FigureArgs {
 impl FigureArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         // Refuse an unknown extension before a pass over the traces.
-        let format = self.format()?;
+        let format = self.output.as_deref().map_or(Ok(FigureFormat::Svg), FigureFormat::from_path)?;
         let grouping = GroupingArgs { pool: self.pool, ..GroupingArgs::default() };
-        let study = self.traces.study_on(&self.engine, &self.scoring, &grouping)?;
+        let study = self.traces.study(&self.scoring, &grouping)?;
         if let Some(path) = &self.output {
             output::check_target(path, study.files_read(Some(&self.style)))?;
         }
         let Self { style, metric: metrics, width, top, .. } = self;
         let top = top.map(usize::from);
-        let figure = study.figure(self.name, &FigureOptions { style, metrics, width, top })?;
+        let figure = figure(&study, self.name, &FigureOptions { style, metrics, width, top })?;
         if top.is_none() && figure.models() > MANY_MODELS {
             output::say(&format!("note: {} models in one figure; --top 12 draws the best 12", figure.models()));
         }
-        let bytes = format.encode(&figure).map_err(Failure::input)?;
+        let bytes = format.encode(&figure)?;
         match &self.output {
             Some(path) => output::write_file(path, &bytes).map(|()| Outcome::Done),
             None => output::plain(bytes),
         }
     }
-
-    fn format(&self) -> Result<FigureFormat, Failure> {
-        match (self.format, &self.output) {
-            (Some(format), _) => Ok(format),
-            (None, Some(path)) => {
-                let hint = |error| Failure::input(format!("{error}; say which one with --format"));
-                FigureFormat::from_path(path).map_err(hint)
-            }
-            (None, None) => Ok(FigureFormat::Svg),
-        }
-    }
-}
-
-fn formats() -> impl TypedValueParser<Value = FigureFormat> {
-    let value = |format: &FigureFormat| {
-        let help = match format {
-            FigureFormat::Svg => "Vectors for the web, values on hover",
-            #[cfg(feature = "raster")]
-            FigureFormat::Png => "Pixels, about 300 per inch at a width of 7 inches",
-            #[cfg(feature = "raster")]
-            FigureFormat::Pdf => "Vectors for LaTeX",
-        };
-        PossibleValue::new(format.ending()).help(help)
-    };
-    let values = PossibleValuesParser::new(FigureFormat::ALL.iter().map(value));
-    values.map(|ending| {
-        let format = FigureFormat::ALL.iter().find(|format| format.ending() == ending);
-        *format.expect("only endings of formats are possible")
-    })
 }

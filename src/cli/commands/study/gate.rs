@@ -5,6 +5,7 @@ use std::ffi::OsString;
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs, TraceArgs, number};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::gate::{GateFormat, GateOptions, GateVerdict};
+use mirrorstats_study::gate::{gate, leading_metric};
 
 /// Compare new episodes with old ones: improved, held, regressed, cannot say
 ///
@@ -71,10 +72,10 @@ impl GateArgs {
         let (base, new) = (open(&self.base)?, open(&self.new)?);
         let metric = match self.metric {
             Some(metric) => metric,
-            None => new.leading_metric()?,
+            None => leading_metric(&new)?,
         };
         let Self { margin, confidence, pool, .. } = self;
-        let gate = new.gate(&base, &GateOptions { metric, margin, confidence, pool })?;
+        let gate = gate(&base, &new, &GateOptions { metric, margin, confidence, pool })?;
         let format = match self.format {
             Format::Text => Some(GateFormat::Text(terminal::width())),
             Format::Md => Some(GateFormat::Markdown),

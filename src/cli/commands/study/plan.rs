@@ -16,19 +16,15 @@ use mirrorstats_exact::suggest::hint;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::vocabulary::schema_columns;
 use mirrorstats_statistics::sample_size::Clusters;
-use mirrorstats_study::StudyError;
 
 /// Plan how many episodes a study needs: for a wanted difference, or the difference that given episodes can show
 #[derive(Clone, Debug, clap::Args)]
-#[command(group(clap::ArgGroup::new("given").required(true).args(["difference", "episodes", "runs", "scenes"])))]
+#[command(group(clap::ArgGroup::new("given").required(true).args(["difference", "runs", "scenes"])))]
 pub struct PlanArgs {
     /// The difference of two rates to show, such as 0.3: how many episodes does it take?
     #[arg(long, value_name = "D", value_parser = share)]
     pub difference: Option<f64>,
-    /// Episodes per model and experiment, equally many for each seed: which difference can they show?
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub episodes: Option<u64>,
-    /// The same as runs per seed
+    /// Runs per seed of each model and experiment: which difference can they show?
     #[arg(long, value_name = "R", value_parser = clap::value_parser!(u64).range(1..))]
     pub runs: Option<u64>,
     /// The same as scenes that each participant plays
@@ -51,7 +47,7 @@ pub struct PlanArgs {
     pub seeds: u64,
     /// Participants of a crossed study instead of seeds, all with equally many scenes: tests count participants, as
     /// `stats` does
-    #[arg(long, value_name = "N", conflicts_with_all = ["seeds", "sequential", "register", "episodes", "runs"], value_parser = clap::value_parser!(u64).range(1..=2000))]
+    #[arg(long, value_name = "N", conflicts_with_all = ["seeds", "sequential", "register", "runs"], value_parser = clap::value_parser!(u64).range(1..=2000))]
     pub participants: Option<u64>,
     /// The share of pairs in which one model alone succeeds [default: as if independent, the worst case]
     #[arg(long, value_name = "SHARE", value_parser = share)]
@@ -94,45 +90,34 @@ pub struct PlanArgs {
 
 impl PlanArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        let plan = plan(self.request()?).map_err(Failure::input)?;
+        let plan = plan(self.request())?;
         if let Some(file) = &self.register {
             self.write(file, &plan)?;
         }
         output::print_rendered(&plan, self.json, |plan| plan.render(terminal::width()))
     }
 
-    fn request(&self) -> Result<PlanRequest, Failure> {
-        Ok(PlanRequest {
-            given: self.given()?,
+    fn request(&self) -> PlanRequest {
+        let runs = || self.runs.or(self.scenes).expect("clap requires one of the three");
+        PlanRequest {
+            given: self.difference.map_or_else(|| Given::Runs(runs()), Given::Difference),
             baseline: self.baseline,
             power: self.power,
             confidence: self.confidence,
             models: self.models,
-            clusters: Clusters { seeds: self.clusters(), icc: self.icc, people: self.participants.is_some() },
+            clusters: Clusters {
+                seeds: self.participants.unwrap_or(self.seeds),
+                icc: self.icc,
+                people: self.participants.is_some(),
+            },
             discordance: self.discordance,
             chance: self.chance,
             sequential: self.sequential,
-        })
-    }
-
-    fn given(&self) -> Result<Given, Failure> {
-        let seeds = self.clusters();
-        match (self.difference, self.episodes, self.runs.or(self.scenes)) {
-            (Some(difference), ..) => Ok(Given::Difference(difference)),
-            (_, Some(episodes), _) if !episodes.is_multiple_of(seeds) => Err(Failure::input(format!(
-                "--episodes {episodes}: expected equally many episodes for each of {seeds} seeds; give a multiple of {seeds}, or --seeds 1"
-            ))),
-            (_, Some(episodes), _) => Ok(Given::Runs(episodes / seeds)),
-            (_, _, runs) => Ok(Given::Runs(runs.expect("one of the four is required"))),
         }
     }
 
-    fn clusters(&self) -> u64 {
-        self.participants.unwrap_or(self.seeds)
-    }
-
     fn write(&self, file: &Path, plan: &Plan) -> Result<(), Failure> {
-        let catalog = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?.catalog;
+        let catalog = Definitions::load(&self.definitions, &schema_columns())?.catalog;
         if file.exists() {
             return Err(registered_before(file));
         }

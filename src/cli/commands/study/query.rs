@@ -71,8 +71,9 @@ mod rows {
     use mirrorstats_engines::polars::run::PolarsError;
     use mirrorstats_engines::polars::shared_file::{WriteError, write_file};
     use mirrorstats_engines::polars::statement;
+    use mirrorstats_exact::format::counted;
     use mirrorstats_exact::replace::is_stream;
-    use mirrorstats_study::StudyError;
+    use mirrorstats_study::{StudyError, query};
     use mirrorstats_tables::Table as Printed;
 
     const NULL: &str = "NULL";
@@ -85,8 +86,8 @@ mod rows {
         if let Some(path) = &args.output {
             output::check_target(path, study.files_read(None))?;
         }
-        let failed = |error: StudyError| failed(error, || study.in_duckdb(&query));
-        let (frame, note) = study.query(&query).map_err(failed)?;
+        let failed = |error: StudyError| failed(error, || query::in_duckdb(&study, &query));
+        let (frame, note) = query::query(&study, &query).map_err(failed)?;
         output::notes(note.as_slice());
         match (format, &args.output) {
             (None, path) => {
@@ -123,9 +124,9 @@ mod rows {
 
     /// The requested format; `None` for a table.
     fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
-        let ending = args.output.as_deref().and_then(Path::extension).map(std::ffi::OsStr::to_ascii_lowercase);
-        let ending = ending.as_deref().and_then(std::ffi::OsStr::to_str);
-        let by_ending = match (ending, &args.output) {
+        let ending =
+            args.output.as_deref().and_then(Path::extension).map(|ending| ending.to_string_lossy().to_lowercase());
+        let by_ending = match (ending.as_deref(), &args.output) {
             (_, None) | (Some("txt"), _) => AnswerFormat::Table,
             (Some("csv"), _) => AnswerFormat::Csv,
             (Some("jsonl" | "ndjson"), _) => AnswerFormat::Jsonl,
@@ -138,15 +139,16 @@ mod rows {
             }
             _ => AnswerFormat::Table,
         };
-        match args.format.unwrap_or(by_ending) {
-            AnswerFormat::Table => Ok(None),
-            AnswerFormat::Csv => Ok(Some(Format::Csv)),
-            AnswerFormat::Jsonl => Ok(Some(Format::JsonLines)),
-            AnswerFormat::Parquet if args.output.is_none() => Err(Failure::Rendered(
-                "error: Parquet is no text for standard output\n  help: name a file with -o".to_owned(),
-            )),
-            AnswerFormat::Parquet => Ok(Some(Format::Parquet)),
-        }
+        Ok(match args.format.unwrap_or(by_ending) {
+            AnswerFormat::Table => None,
+            AnswerFormat::Csv => Some(Format::Csv),
+            AnswerFormat::Jsonl => Some(Format::JsonLines),
+            AnswerFormat::Parquet if args.output.is_none() => {
+                let words = "error: Parquet is no text for standard output\n  help: name a file with -o";
+                return Err(Failure::Rendered(words.to_owned()));
+            }
+            AnswerFormat::Parquet => Some(Format::Parquet),
+        })
     }
 
     fn render(excerpt: &Excerpt, width: Option<usize>) -> String {
@@ -155,18 +157,10 @@ mod rows {
         let shown = |row: &Vec<Option<String>>| -> Vec<String> {
             row.iter().map(|cell| cell.clone().unwrap_or_else(|| NULL.to_owned())).collect()
         };
-        for row in &excerpt.head {
-            table.push(shown(row));
-        }
         let left_out = excerpt.rows - excerpt.head.len() - excerpt.tail.len();
-        if left_out > 0 {
-            table.push(excerpt.columns.iter().map(|_| "·"));
-        }
-        for row in &excerpt.tail {
-            table.push(shown(row));
-        }
-        let count = if excerpt.rows == 1 { "1 row".to_owned() } else { format!("{} rows", excerpt.rows) };
+        let gap = (left_out > 0).then(|| vec!["·".to_owned(); excerpt.columns.len()]);
+        let rows = excerpt.head.iter().map(shown).chain(gap).chain(excerpt.tail.iter().map(shown));
         let note = if left_out > 0 { format!(" ({} shown)", excerpt.rows - left_out) } else { String::new() };
-        format!("{}{count}{note}\n", table.within(width))
+        format!("{}{}{note}\n", table.with(rows).within(width), counted(excerpt.rows as u64, "row"))
     }
 }

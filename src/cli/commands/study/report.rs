@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::scoring::with_plan;
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
 use mirrorstats_report::bundle::Manifest;
-use mirrorstats_study::{Report, ReportOptions, WrittenReport};
+use mirrorstats_study::report::{self, Report, ReportOptions, WrittenReport};
 
 /// Compute tables and figures of traces: print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
@@ -20,8 +20,6 @@ pub struct ReportArgs {
     pub traces: TraceArgs,
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    #[command(flatten)]
-    pub engine: EngineArgs,
     /// The folder to write
     #[arg(short, long, value_name = "DIR", default_value = "reports/latest")]
     pub out: PathBuf,
@@ -58,11 +56,11 @@ pub struct ReportAnswer {
 
 impl ReportArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        let study = self.traces.study_on(&self.engine, &self.scoring, &self.grouping)?;
+        let study = self.traces.study(&self.scoring, &self.grouping)?;
         let study = with_plan(study, self.plan.as_deref())?;
         let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
-        study.check_folder(&self.out, &options)?;
-        let report = study.report(&options)?;
+        report::check_folder(&study, &self.out, &options)?;
+        let report = report::report(&study, &options)?;
         output::notes(&report.notes);
         let warnings = study.stale_checksums().into_iter().chain(report.notes.iter().cloned()).collect();
         let WrittenReport { files, manifest } = report.write(&self.out)?;

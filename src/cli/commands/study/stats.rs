@@ -8,6 +8,7 @@ use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::statistics::text::Length;
 use mirrorstats_analysis::statistics::{Options, Sequential, Statistics};
 use mirrorstats_exact::suggest::hint;
+use mirrorstats_study::statistics::{sequential, statistics};
 
 const ALL: &str = "all";
 
@@ -52,9 +53,9 @@ impl StatsArgs {
         let (confidence, improvements) = (self.confidence, self.full || self.json);
         let options = Options { confidence, improvements, ..Options::default() };
         if self.sequential {
-            self.print_sequential(&study.sequential(&options)?)
+            self.print_sequential(&sequential(&study, &options)?)
         } else {
-            self.print(&study.statistics(&options)?)
+            self.print(&statistics(&study.grouped()?, &options)?)
         }
     }
 
@@ -84,26 +85,23 @@ impl StatsArgs {
         all: impl Iterator<Item = &'a str>,
         headline: &[String],
     ) -> Result<Vec<String>, Failure> {
+        if self.metrics.is_empty() {
+            return Ok(headline.to_vec());
+        }
         let mut known: Vec<&str> = Vec::new();
         for metric in all {
             if !known.contains(&metric) {
                 known.push(metric);
             }
         }
-        if self.metrics.is_empty() {
-            return Ok(headline.to_vec());
-        }
         if self.metrics.iter().any(|name| name == ALL) {
             return Ok(known.into_iter().map(str::to_owned).collect());
         }
-        match self.metrics.iter().find(|name| !known.contains(&name.as_str())) {
-            None => Ok(self.metrics.clone()),
-            Some(name) => {
-                let (known, suggestion) = (known.join(", "), hint(name, known.iter().copied()));
-                let words = format!("no {kind} is named `{name}`; the definitions have {known}{suggestion}");
-                Err(Failure::input(words))
-            }
-        }
+        let Some(name) = self.metrics.iter().find(|name| !known.contains(&name.as_str())) else {
+            return Ok(self.metrics.clone());
+        };
+        let (suggestion, known) = (hint(name, known.iter().copied()), known.join(", "));
+        Err(Failure::input(format!("no {kind} is named `{name}`; the definitions have {known}{suggestion}")))
     }
 }
 

@@ -10,10 +10,10 @@ use std::sync::Arc;
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_study::Question;
+use mirrorstats_study::question::Question;
 use mirrorstats_trace::beside::label_line::check_coder;
 use mirrorstats_trace::inputs;
-use mirrorstats_view::{Options, View, ViewError, export, routes};
+use mirrorstats_view::{Options, View, export, routes};
 use mirrorstats_web::{Guard, check_token, new_token};
 
 /// Show recordings in the browser: the report, each episode step by step, two episodes side by side
@@ -139,15 +139,6 @@ impl ViewArgs {
         }
         routes::serve(Arc::new(view), listener, guard).map_err(taken)?;
         Ok(Outcome::Done)
-    }
-}
-
-impl From<ViewError> for Failure {
-    fn from(error: ViewError) -> Self {
-        match error {
-            ViewError::Study(error) => (*error).into(),
-            error => Self::input(error),
-        }
     }
 }
 

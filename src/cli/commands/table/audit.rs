@@ -2,12 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
-
+use crate::cli::args::one_of;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::rounding::Rounding;
 use mirrorstats_report::published::audit::MOST_EPISODES;
-use mirrorstats_study::audit_tables;
+use mirrorstats_study::audit::audit_tables;
 
 /// Name the cells of published tables whose mean and standard error no data can give
 #[derive(Clone, Debug, clap::Args)]
@@ -22,7 +21,7 @@ pub struct AuditArgs {
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     pub definitions: PathBuf,
     /// Roundings to consider, separated by commas: half-even, half-up, binary, twice, truncate [default: all]
-    #[arg(long, value_name = "RULES", value_delimiter = ',', value_parser = rounding_parser(), hide_possible_values = true)]
+    #[arg(long, value_name = "RULES", value_delimiter = ',', value_parser = one_of(&Rounding::ALL, Rounding::name), hide_possible_values = true)]
     pub rounding: Vec<Rounding>,
     /// Print the answer as JSON
     #[arg(long)]
@@ -37,12 +36,4 @@ impl AuditArgs {
         output::print_rendered(&found, self.json, |found| found.render(terminal::width()))?;
         Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }
-}
-
-fn rounding_parser() -> impl clap::builder::TypedValueParser<Value = Rounding> {
-    let names = Rounding::ALL.map(Rounding::name);
-    PossibleValuesParser::new(names).map(|name| {
-        let rounding = Rounding::ALL.into_iter().find(|rounding| rounding.name() == name);
-        rounding.expect("only names of roundings are possible")
-    })
 }

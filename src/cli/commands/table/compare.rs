@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
+use mirrorstats_study::published::compare;
 
 /// Compare the tables of traces with published ones, cell by cell.
 #[derive(Clone, Debug, clap::Args)]
@@ -32,7 +33,7 @@ impl CompareArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
         let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let comparison = study.compare(&self.published, &self.style)?;
+        let comparison = compare(&study, &self.published, &self.style)?;
         output::print_rendered(&comparison, self.json, |found| found.render(terminal::width()))?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

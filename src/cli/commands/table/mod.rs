@@ -14,7 +14,18 @@ use mirrorstats_study::verify::verify;
 pub enum TableCommand {
     Compare(compare::CompareArgs),
     Audit(audit::AuditArgs),
-    Verify(VerifyArgs),
+    /// Hold the files of a report against the hashes in its manifest
+    ///
+    /// Names every file that was changed, is missing, or is there though the manifest does not list it, and exits with 1
+    /// then. The manifest itself is taken at its word.
+    Verify {
+        /// The folder of a report
+        #[arg(value_name = "REPORT")]
+        report: PathBuf,
+        /// Answer as JSON
+        #[arg(long)]
+        json: bool,
+    },
     Rescore(rescore::RescoreArgs),
 }
 
@@ -23,30 +34,12 @@ impl TableCommand {
         match self {
             Self::Compare(args) => args.run(),
             Self::Audit(args) => args.run(),
-            Self::Verify(args) => args.run(),
+            Self::Verify { report, json } => {
+                let found = verify(&report)?;
+                output::print(&found, json)?;
+                Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
+            }
             Self::Rescore(args) => args.run(),
         }
-    }
-}
-
-/// Hold the files of a report against the hashes in its manifest
-///
-/// Names every file that was changed, is missing, or is there though the manifest does not list it, and exits with 1 then.
-/// The manifest itself is taken at its word.
-#[derive(Clone, Debug, clap::Args)]
-pub struct VerifyArgs {
-    /// The folder of a report
-    #[arg(value_name = "REPORT")]
-    report: PathBuf,
-    /// Answer as JSON
-    #[arg(long)]
-    json: bool,
-}
-
-impl VerifyArgs {
-    pub fn run(&self) -> Result<Outcome, Failure> {
-        let found = verify(&self.report).map_err(Failure::input)?;
-        output::print(&found, self.json)?;
-        Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }
 }

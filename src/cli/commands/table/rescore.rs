@@ -14,7 +14,8 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace::{Content, TemporaryFolder, folder_of};
 use mirrorstats_report::bundle::Manifest;
-use mirrorstats_study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored, traces_of};
+use mirrorstats_study::report::WrittenReport;
+use mirrorstats_study::rescore::{RescoreRequest, Rescored, folder_of_rescored, traces_of};
 use mirrorstats_tables::Table;
 use mirrorstats_trace::inputs::Input;
 
@@ -77,12 +78,13 @@ pub struct RescoreAnswer {
 impl RescoreArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let out = folder_of_rescored(&self.report, self.out.as_deref())?;
-        let mut traces = traces_of(&self.report, &self.traces)?;
+        let traces = traces_of(&self.report, &self.traces)?;
         let reread = self.reparse.then(|| reparse(&traces, &out)).transpose()?;
-        if let Some(reread) = &reread {
-            traces.clone_from(&reread.traces);
-        }
-        let rescored = self.request(&out, traces).run()?;
+        let traces = reread.as_ref().map_or(traces, |reread| reread.traces.clone());
+        let Self { report, definitions, style, metrics, .. } = self.clone();
+        let threads = self.threads.count();
+        let rescored =
+            RescoreRequest { report, definitions, traces, out: out.clone(), style, metrics, threads }.run()?;
         output::notes(&rescored.report.notes);
         let written = rescored.report.write(&out)?;
         // A kill between the two leaves a report without its traces, which the same command makes again.
@@ -92,18 +94,6 @@ impl RescoreArgs {
             Err(reason) => output::note(&format!("no comparison with the old report: {reason}")),
         }
         self.print(&out, written, rescored, reparsed)
-    }
-
-    fn request(&self, out: &Path, traces: Vec<Input>) -> RescoreRequest {
-        RescoreRequest {
-            report: self.report.clone(),
-            out: out.to_owned(),
-            definitions: self.definitions.clone(),
-            traces,
-            style: self.style.clone(),
-            metrics: self.metrics.clone(),
-            threads: self.threads.count(),
-        }
     }
 
     fn print(
@@ -121,7 +111,7 @@ impl RescoreArgs {
             return output::print_json(&RescoreAnswer { out, files, episodes, manifest, reparsed, changes });
         }
         if let Some(reparsed) = &reparsed {
-            tell_reparsed(&mut io::stdout().lock(), reparsed, self.limit)?;
+            write_reparsed(&mut io::stdout().lock(), reparsed, self.limit)?;
         }
         if let Some(changes) = &changes {
             io::stdout().lock().write_all(changes.render(self.limit, terminal::width()).as_bytes())?;
@@ -157,11 +147,8 @@ fn reparse(traces: &[Input], out: &Path) -> Result<Reread, Failure> {
         let target = folder.join(trace.path.file_name().unwrap_or_default());
         output::check_target(&target, [&trace.path])?;
         if let Some(other) = traces[..at].iter().find(|other| other.path.file_name() == trace.path.file_name()) {
-            return Err(Failure::input(format!(
-                "`{}` and `{}` have one name",
-                visible(&other.name),
-                visible(&trace.name)
-            )));
+            let (one, other) = (visible(&other.name), visible(&trace.name));
+            return Err(Failure::input(format!("`{one}` and `{other}` have one name")));
         }
     }
     if out.exists() != folder.exists() {
@@ -172,11 +159,11 @@ fn reparse(traces: &[Input], out: &Path) -> Result<Reread, Failure> {
     output::make_folder(folder_of(&folder))?;
     let stage = TemporaryFolder::create(folder_of(&folder), "traces")
         .map_err(|error| output::unwritable(folder_of(&folder), error))?;
-    let (answer, traces) = ReparseAnswer::reparse(traces, stage.path(), &folder).map_err(Failure::input)?;
+    let (answer, traces) = ReparseAnswer::reparse(traces, stage.path(), &folder)?;
     Ok(Reread { _stage: stage, folder, answer, traces })
 }
 
-fn tell_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize) -> io::Result<()> {
+fn write_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize) -> io::Result<()> {
     let mut table =
         Table { names: 2, ..Table::of_texts(["episode", "t", "column", "before", "after"]).aligned_right([1]) };
     let name = |value: &Option<String>| visible(value.as_deref().unwrap_or("--"));

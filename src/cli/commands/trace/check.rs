@@ -6,9 +6,9 @@ use crate::cli::args::{self, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::fixed;
-use mirrorstats_report::layout::quality;
+use mirrorstats_report::layout;
 use mirrorstats_score::quality::{CellKey, Quality, QualityByCell};
-use mirrorstats_study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
+use mirrorstats_study::quality::{self, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///
@@ -22,21 +22,9 @@ pub struct CheckArgs {
     /// The largest share of replies without a decision, such as 0.05
     #[arg(long, value_name = "SHARE", value_parser = share)]
     pub max_unreadable: Option<f64>,
-    /// The largest share of refusals
-    #[arg(long, value_name = "SHARE", value_parser = share)]
-    pub max_refused: Option<f64>,
-    /// The largest share of replies that were cut off
-    #[arg(long, value_name = "SHARE", value_parser = share)]
-    pub max_truncated: Option<f64>,
-    /// The largest share of replies that had to be repaired
-    #[arg(long, value_name = "SHARE", value_parser = share)]
-    pub max_repaired: Option<f64>,
     /// The most lost episodes, over all cells
     #[arg(long, value_name = "N")]
     pub max_lost: Option<u64>,
-    /// The longest 95th percentile of a cell's reply times, in milliseconds
-    #[arg(long, value_name = "MS")]
-    pub max_latency: Option<i64>,
     /// Answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -44,13 +32,13 @@ pub struct CheckArgs {
 
 impl CheckArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let &Self { max_unreadable, max_refused, max_truncated, max_repaired, max_lost, max_latency, .. } = self;
-        let limits = QualityLimits { max_unreadable, max_refused, max_truncated, max_repaired, max_lost, max_latency };
-        if limits.is_empty() {
+        if self.max_unreadable.is_none() && self.max_lost.is_none() {
             let words = "expected a limit to check, found none\n  help: name one, such as --max-unreadable 0.05";
             return Err(Failure::input(words));
         }
-        let (answer, cells) = self.traces.open()?.check_quality(&limits)?;
+        let limits = QualityLimits { max_unreadable: self.max_unreadable, max_lost: self.max_lost };
+        let cells = quality::quality(&self.traces.open()?)?;
+        let answer = QualityCheckAnswer::of(&cells, limits);
         if self.json {
             output::print_json(&answer)?;
         } else {
@@ -62,7 +50,7 @@ impl CheckArgs {
 
 fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    out.write_all(quality::text(cells, crate::cli::terminal::width()).as_bytes())?;
+    out.write_all(layout::quality::text(cells, crate::cli::terminal::width()).as_bytes())?;
     writeln!(out)?;
     let named = |cell: &CellKey| match cell.condition.as_str() {
         _ if !cells.has_conditions() => format!("{}, {}: ", visible(&cell.experiment), visible(&cell.model)),

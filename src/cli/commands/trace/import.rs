@@ -3,11 +3,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::cli::args::one_of;
 use crate::cli::{Failure, Outcome, output};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use mirrorstats_exact::replace;
 use mirrorstats_import::{Format, Mapping, Text};
-use mirrorstats_study::ImportRequest;
+use mirrorstats_study::import::{ImportRequest, import};
 
 /// Make a trace of another harness's steps or logs
 ///
@@ -21,7 +21,7 @@ pub struct ImportArgs {
     #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
     /// The format of the files [default: detected from names and first bytes]
-    #[arg(long, value_name = "FORMAT", value_parser = formats())]
+    #[arg(long, value_name = "FORMAT", value_parser = one_of(&Format::ALL, Format::name))]
     from: Option<Format>,
     /// The trace to write
     #[arg(short, long, value_name = "TRACE.parquet")]
@@ -35,8 +35,8 @@ pub struct ImportArgs {
     palette: Option<PathBuf>,
     /// What similar episodes share: statistics treat it as a cluster. Episodes with an equal `scene` are pairs by
     /// default
-    #[arg(long, value_enum, value_name = "COLUMN")]
-    cluster: Option<ClusterArg>,
+    #[arg(long, value_name = "COLUMN", value_parser = ["seed"])]
+    cluster: Option<String>,
     /// The steps are rebuilt from published numbers, so statistics use no pairs and no clusters
     #[arg(long, conflicts_with = "cluster")]
     reconstruction: bool,
@@ -52,16 +52,10 @@ pub struct ImportArgs {
     json: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ClusterArg {
-    /// The episodes of one seed
-    Seed,
-}
-
 impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         self.check_places()?;
-        let mut mapping = Mapping::parse(&self.map, &self.set).map_err(Failure::input)?;
+        let mut mapping = Mapping::parse(&self.map, &self.set)?;
         let texts = self.steps.iter().map(|path| text(path, self.from, &mut mapping)).collect::<Result<Vec<_>, _>>()?;
         output::notes(&mapping.left_out());
         let request = ImportRequest {
@@ -71,7 +65,7 @@ impl ImportArgs {
             clusters_by_seed: self.cluster.is_some(),
             reconstruction: self.reconstruction,
         };
-        output::print(&mirrorstats_study::import(texts, &request)?, self.json)
+        output::print(&import(texts, &request)?, self.json)
     }
 
     fn check_places(&self) -> Result<(), Failure> {
@@ -79,14 +73,14 @@ impl ImportArgs {
             let words = "error: `-`: expected standard input once, found it twice\n  help: name it once";
             return Err(Failure::Rendered(words.to_owned()));
         }
-        replace::check_target(&self.out, &self.steps, "the steps themselves").map_err(Failure::input)?;
+        replace::check_target(&self.out, &self.steps, "the steps themselves")?;
         output::check_target(&self.out, [&self.definitions].into_iter().chain(&self.palette))
     }
 }
 
 fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text, Failure> {
     if matches!(from, None | Some(Format::LeRobot))
-        && let Some(text) = Text::of_data_set(path, mapping).map_err(Failure::input)?
+        && let Some(text) = Text::of_data_set(path, mapping)?
     {
         return Ok(text);
     }
@@ -96,11 +90,6 @@ fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text
         text.mapped(format, mapping)
     });
     mapped.map_err(Failure::input)
-}
-
-fn formats() -> impl TypedValueParser<Value = Format> {
-    let names = PossibleValuesParser::new(Format::ALL.map(Format::name));
-    names.map(|name| Format::named(&name).expect("it is one of the names"))
 }
 
 fn is_standard_input(path: &Path) -> bool {

@@ -10,9 +10,9 @@ use crate::cli::args::TraceArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
-use mirrorstats_report::layout::quality;
+use mirrorstats_report::layout;
 use mirrorstats_score::quality::QualityByCell;
-use mirrorstats_study::CellAnswer;
+use mirrorstats_study::quality::{CellAnswer, has_quality, quality};
 use mirrorstats_tables::{Table, wrapped};
 use mirrorstats_trace::footers::answered::by_others;
 use mirrorstats_trace::footers::checksums::Checksums;
@@ -46,18 +46,18 @@ impl InfoCommand {
         let study = self.input.open()?;
         let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
         output::notes(&by_others(study.traces()?.files()));
-        let info = info(study.traces()?, listing, self.input.threads.count()).map_err(Failure::input)?;
+        let info = info(study.traces()?, listing, self.input.threads.count())?;
         if let Some(episodes) = info.episode_list.as_ref().filter(|_| !self.json) {
             write!(io::stdout().lock(), "{}", list_of(episodes).within(terminal::width()))?;
             return Ok(Outcome::Done);
         }
-        let quality = if study.has_quality()? { study.quality()? } else { QualityByCell::default() };
+        let cells = if has_quality(&study)? { quality(&study)? } else { QualityByCell::default() };
         let mut out = io::stdout().lock();
         if self.json {
-            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: CellAnswer::of_all(&quality) }))?;
+            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: CellAnswer::of_all(&cells) }))?;
         } else {
             print(&mut out, &info, terminal::width())?;
-            let text = quality::text(&quality, terminal::width());
+            let text = layout::quality::text(&cells, terminal::width());
             if !text.is_empty() {
                 writeln!(out, "\nreplies by experiment and model\n{text}")?;
             }

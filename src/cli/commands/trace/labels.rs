@@ -3,7 +3,7 @@
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::format::{counted, fixed};
-use mirrorstats_study::{LabelAgreement, PairAgreement};
+use mirrorstats_study::agreement::{LabelAgreement, PairAgreement, agreement};
 use mirrorstats_tables::Table;
 
 const CONFIDENCE: f64 = 0.95;
@@ -26,7 +26,8 @@ pub struct LabelsArgs {
 impl LabelsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let scoring = ScoringArgs { condition: self.condition, ..ScoringArgs::default() };
-        let found = self.input.study(&scoring, &GroupingArgs::default())?.agreement(CONFIDENCE)?;
+        let study = self.input.study(&scoring, &GroupingArgs::default())?;
+        let found = agreement(&study, CONFIDENCE)?;
         output::print_rendered(&found, self.json, |found| text(found, terminal::width()))
     }
 }

@@ -53,10 +53,10 @@ pub struct RecoverAnswer {
 impl RecoverArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         output::check_target(&self.out, [&self.log])?;
-        let recovered = recover(&self.log).map_err(Failure::input)?;
+        let recovered = recover(&self.log)?;
         let columns = recovered.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
         let rows = recovered.episodes.iter().map(|episode| merge::rows(episode, &columns));
-        let rows = rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+        let rows = rows.collect::<Result<Vec<_>, _>>()?;
         self.check_target(&rows, recovered.recording.as_ref())?;
         let answer = RecoverAnswer {
             episodes: rows.len(),
@@ -65,7 +65,7 @@ impl RecoverArgs {
             losses: recovered.losses,
         };
         if answer.written {
-            merge::write(&self.out, recovered.recording.as_ref(), &rows).map_err(Failure::input)?;
+            merge::write(&self.out, recovered.recording.as_ref(), &rows)?;
             self.check()?;
         }
         output::print(&answer, self.json)?;
@@ -76,29 +76,25 @@ impl RecoverArgs {
     fn check_target(&self, rows: &[EpisodeRows], recording: Option<&Value>) -> Result<(), Failure> {
         // A file that is not a readable trace may be replaced.
         let (Ok(file), Ok(there)) = (TraceFile::open(&self.target()), merge::read(&self.out)) else { return Ok(()) };
-        let help = "name another file, or move that one away";
+        let (out, log) = (self.out.display(), self.log.display());
+        let refused =
+            |why: String| Err(Failure::input(format!("{why}\n  help: name another file, or move that one away")));
         let ids: BTreeSet<&str> = rows.iter().map(|episode| episode.episode_id.as_str()).collect();
         if let Some(missing) = there.iter().find(|episode| !ids.contains(episode.episode_id.as_str())) {
-            let (out, id) = (self.out.display(), &missing.episode_id);
-            return Err(Failure::input(format!(
-                "`{out}` has the episode `{id}`, which cannot be recovered from the log\n  help: {help}"
-            )));
+            let id = &missing.episode_id;
+            return refused(format!("`{out}` has the episode `{id}`, which cannot be recovered from the log"));
         }
         if without_seeds(Some(&file.recording())) != without_seeds(recording) {
-            let out = self.out.display();
-            return Err(Failure::input(format!(
-                "`{out}` is a trace of another recording than the log\n  help: {help}"
-            )));
+            return refused(format!("`{out}` is a trace of another recording than the log"));
         }
         let hashes: BTreeMap<_, _> = rows.iter().map(|episode| (&episode.episode_id, episode.stated_hash())).collect();
         for episode in &there {
-            let logged = hashes.get(&episode.episode_id).cloned().flatten();
+            let (id, logged) = (&episode.episode_id, hashes.get(&episode.episode_id).cloned().flatten());
             if let Some((traced, logged)) = episode.stated_hash().zip(logged).filter(|(a, b)| a != b) {
-                let (out, log, id) = (self.out.display(), self.log.display(), &episode.episode_id);
-                return Err(Failure::input(format!(
+                return refused(format!(
                     "`{out}` and `{log}` do not belong together: expected rows of the episode `{id}` with the hash {traced}, \
-                     as in the trace, found {logged}\n  help: {help}"
-                )));
+                     as in the trace, found {logged}"
+                ));
             }
         }
         Ok(())
@@ -109,7 +105,7 @@ impl RecoverArgs {
     }
 
     fn check(&self) -> Result<(), Failure> {
-        let report = validate(&[self.target()], None, NonZeroUsize::MIN).map_err(Failure::input)?;
+        let report = validate(&[self.target()], None, NonZeroUsize::MIN)?;
         match report.findings.iter().find(|finding| finding.severity == Severity::Error) {
             None => Ok(()),
             Some(finding) => Err(Failure::input(format!("the recovered trace breaks a rule: {finding}"))),

@@ -30,21 +30,16 @@ pub struct SealArgs {
 
 impl SealArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let answer = seal(&Input::new(&self.input), &self.out, self.threads.count())?;
-        output::print_told(&answer, self.json, tell)
-    }
-}
-
-impl From<SealError> for Failure {
-    fn from(error: SealError) -> Self {
-        match error {
+        let sealed = seal(&Input::new(&self.input), &self.out, self.threads.count());
+        let answer = sealed.map_err(|error| match error {
             SealError::Unwritable { path, source } => output::unwritable(&path, source),
-            other => Self::input(other),
-        }
+            other => other.into(),
+        })?;
+        output::print_with(&answer, self.json, write_answer)
     }
 }
 
-fn tell(text: &mut String, answer: &SealAnswer) -> fmt::Result {
+fn write_answer(text: &mut String, answer: &SealAnswer) -> fmt::Result {
     let SealAnswer { name, out, episodes, steps, sha256, .. } = answer;
     let (episodes, steps) = (counted(*episodes, "episode"), counted(*steps, "step"));
     writeln!(text, "{out}: {name} with checksums, {episodes}, {steps}; sha256 {sha256}")

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::{Failure, Outcome, output};
-use mirrorstats_study::{findings, findings_text};
+use mirrorstats_study::findings::{findings, findings_text};
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::footers::answered::by_others;
 use mirrorstats_trace::inputs;
@@ -29,7 +29,7 @@ pub struct ValidateCommand {
 
 impl ValidateCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
+        let inputs = inputs::resolve(&self.input.traces, io::stdin())?;
         let report = findings(self.definitions.as_deref(), &inputs, self.input.threads.count())?;
         let files: Vec<_> = inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect();
         output::notes(&by_others(&files));

@@ -35,7 +35,7 @@ impl FilmstripArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let format = self.format()?;
         let figure = self.figure()?;
-        output::write_file(&self.out, &format.encode(&figure).map_err(Failure::input)?)?;
+        output::write_file(&self.out, &format.encode(&figure)?)?;
         Ok(Outcome::Done)
     }
 
@@ -53,7 +53,7 @@ impl FilmstripArgs {
         let (logs, traces) = self.sources()?;
         output::check_target(&self.out, &logs)?;
         let files = if traces.is_empty() { Ok(Vec::new()) } else { inputs::resolve(&traces, io::stdin()) };
-        let files = files.map_err(Failure::input)?;
+        let files = files?;
         output::note_stale_checksums(&files);
         output::check_target(&self.out, files.iter().map(|file| &file.path))?;
         if let Some(reel) = strip.from_logs(&logs, &files)? {

@@ -6,14 +6,13 @@ pub mod filmstrip;
 pub mod record;
 pub mod replay;
 
-use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-#[cfg(feature = "raster")]
-use crate::cli::output;
-use crate::cli::{Failure, Outcome, experiments};
+use serde_json::json;
+
+use crate::cli::{Failure, Outcome, experiments, output};
 use mirrorstats_record::plan::Experiments;
-use mirrorstats_sim::config::{ConfigError, WorldConfig};
+use mirrorstats_sim::config::WorldConfig;
 #[cfg(feature = "raster")]
 use mirrorstats_sim::contact_sheet::row;
 use mirrorstats_sim::scene::Scene;
@@ -33,81 +32,68 @@ enum WorldVerb {
     /// Print the built-in configuration: every size, speed, light and threshold, as TOML for --config
     Config,
     /// Print the scene of one episode as JSON, a scene for each experiment
-    Scene(SceneArgs),
+    Scene {
+        /// The experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
+        #[arg(value_name = "LIST", value_parser = experiments::parser())]
+        experiments: Experiments,
+        /// The seed of the block of runs
+        #[arg(long, default_value_t = 1)]
+        seed: i32,
+        /// The run within its seed
+        #[arg(long, default_value_t = 1)]
+        run: i32,
+        /// A TOML file whose values lie over the built-in configuration
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+    },
     /// Draw the contact sheet: experiments from above and as the agent sees them
     #[cfg(feature = "raster")]
-    Sheet(SheetArgs),
-}
-
-/// The scene.
-#[derive(Clone, Debug, clap::Args)]
-struct SceneArgs {
-    /// The experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
-    #[arg(value_name = "LIST", value_parser = experiments::parser())]
-    experiments: Experiments,
-    /// The seed of the block of runs
-    #[arg(long, default_value_t = 1)]
-    seed: i32,
-    /// The run within its seed
-    #[arg(long, default_value_t = 1)]
-    run: i32,
-    /// A TOML file whose values lie over the built-in configuration
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-}
-
-/// The path of the sheet.
-#[cfg(feature = "raster")]
-#[derive(Clone, Debug, clap::Args)]
-struct SheetArgs {
-    /// The folder for `sheet.png`
-    #[arg(short, long, value_name = "DIR", default_value = "reports/world")]
-    out: PathBuf,
-    /// The experiments, one row each: E1, E1..E5, E1,E3, or a file such as mine.toml
-    #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = experiments::parser())]
-    experiment: Experiments,
-    /// The seed of the scenes
-    #[arg(long, default_value_t = 1)]
-    seed: i32,
-    /// A TOML file whose values lie over the built-in configuration
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
+    Sheet {
+        /// The folder for `sheet.png`
+        #[arg(short, long, value_name = "DIR", default_value = "reports/world")]
+        out: PathBuf,
+        /// The experiments, one row each: E1, E1..E5, E1,E3, or a file such as mine.toml
+        #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = experiments::parser())]
+        experiment: Experiments,
+        /// The seed of the scenes
+        #[arg(long, default_value_t = 1)]
+        seed: i32,
+        /// A TOML file whose values lie over the built-in configuration
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+    },
 }
 
 /// The world configuration in a file, or the built-in one.
 pub(super) fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
     let Some(path) = path else { return Ok(WorldConfig::default()) };
-    WorldConfig::load(path).map_err(|error| match error {
-        ConfigError::Faults(faults) => Failure::Faults(faults),
-        unreadable @ ConfigError::Unreadable { .. } => Failure::input(unreadable),
-    })
+    Ok(WorldConfig::load(path)?)
 }
 
 impl WorldArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.verb {
-            WorldVerb::Replay(args) => return args.run(),
-            WorldVerb::Filmstrip(args) => return args.run(),
-            WorldVerb::Config => io::stdout().lock().write_all(WorldConfig::default_text().as_bytes())?,
-            WorldVerb::Scene(args) => {
-                let config = configured(args.config.as_ref())?;
-                for experiment in experiments::asked(&args.experiments, &config)? {
-                    let scene = Scene::draw(&config, experiment, args.seed, args.run).map_err(Failure::input)?;
-                    writeln!(io::stdout().lock(), "{:#}", serde_json::json!(scene))?;
+            WorldVerb::Replay(args) => args.run(),
+            WorldVerb::Filmstrip(args) => args.run(),
+            WorldVerb::Config => output::plain(WorldConfig::default_text()),
+            WorldVerb::Scene { experiments, seed, run, config } => {
+                let config = configured(config.as_ref())?;
+                for experiment in experiments::asked(&experiments, &config)? {
+                    output::plain(format!("{:#}\n", json!(Scene::draw(&config, experiment, seed, run)?)))?;
                 }
+                Ok(Outcome::Done)
             }
             #[cfg(feature = "raster")]
-            WorldVerb::Sheet(args) => {
-                let config = configured(args.config.as_ref())?;
-                let target = args.out.join("sheet.png");
-                output::check_target(&target, &args.config)?;
-                let experiments = experiments::asked(&args.experiment, &config)?;
-                let rows = experiments.iter().map(|experiment| row(&config, experiment, args.seed));
-                let png = contact_sheet::png(&rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?)?;
-                output::make_folder(&args.out)?;
-                output::write_file(&target, &png)?;
+            WorldVerb::Sheet { out, experiment, seed, config: file } => {
+                let config = configured(file.as_ref())?;
+                let target = out.join("sheet.png");
+                output::check_target(&target, &file)?;
+                let experiments = experiments::asked(&experiment, &config)?;
+                let rows = experiments.iter().map(|experiment| row(&config, experiment, seed));
+                let png = contact_sheet::png(&rows.collect::<Result<Vec<_>, _>>()?)?;
+                output::make_folder(&out)?;
+                output::write_file(&target, &png).map(|()| Outcome::Done)
             }
         }
-        Ok(Outcome::Done)
     }
 }

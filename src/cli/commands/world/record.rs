@@ -138,7 +138,7 @@ impl RecordArgs {
             return self.print_probes(&each);
         }
         if each.len() > 1 {
-            dry_run::tell_all(&mut io::stderr().lock(), &forecasts()?)?;
+            dry_run::write_all(&mut io::stderr().lock(), &forecasts()?)?;
         }
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         let playing = Playing::default();
@@ -191,8 +191,8 @@ impl RecordArgs {
     fn print_forecasts(&self, forecasts: &[ForecastAnswer]) -> Result<Outcome, Failure> {
         match forecasts {
             all if self.json => self.print_list(all).map(|()| Outcome::Done),
-            [one] => Ok(dry_run::tell(&mut io::stdout().lock(), one).map(|()| Outcome::Done)?),
-            all => Ok(dry_run::tell_all(&mut io::stdout().lock(), all).map(|()| Outcome::Done)?),
+            [one] => Ok(dry_run::write_one(&mut io::stdout().lock(), one).map(|()| Outcome::Done)?),
+            all => Ok(dry_run::write_all(&mut io::stdout().lock(), all).map(|()| Outcome::Done)?),
         }
     }
 
@@ -201,7 +201,7 @@ impl RecordArgs {
         for args in each {
             let answer = args.probe()?;
             if !self.json {
-                probe::tell(&mut io::stdout().lock(), &answer)?;
+                probe::write(&mut io::stdout().lock(), &answer)?;
             }
             answers.push(answer);
         }
@@ -274,7 +274,7 @@ impl RecordArgs {
             )));
         }
         let plan = Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard };
-        MOST_EPISODES.check(plan.size()).map_err(Failure::input)?;
+        MOST_EPISODES.check(plan.size())?;
         #[cfg(feature = "view")]
         if self.agent == HUMAN {
             return self.human.spread(plan);
@@ -286,7 +286,7 @@ impl RecordArgs {
     fn forecast(&self, all: &Budget) -> Result<ForecastAnswer, Failure> {
         let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
-        all.spend(plan.size()).map_err(Failure::input)?;
+        all.spend(plan.size())?;
         let player = match self.agent.as_str() {
             "vlm" => AnyPlayer::Model(self.vlm.forecaster(&self.out)?),
             _ => self.player_who(false)?,
@@ -309,7 +309,7 @@ impl RecordArgs {
 
     /// Locks the folder for this process, before a player reads or writes there.
     pub fn lock(&self) -> Result<FolderLock, Failure> {
-        FolderLock::take(&self.out).map_err(Failure::input)
+        Ok(FolderLock::take(&self.out)?)
     }
 
     /// Records with this player, whatever `--agent` names, until the end or until `stop` is set. Reports only progress.
@@ -344,15 +344,15 @@ impl RecordArgs {
         let deleted = player.deleted();
         bar.clear();
         player.end(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
-        let tally = outcome.map_err(Failure::input)?;
-        assembled.map_err(Failure::input)?;
+        let tally = outcome?;
+        assembled?;
         let deleted = deleted.map_err(Failure::input)?;
         let stays = |key: &Key| !deleted.contains(&key.episode_id(subject));
         let found: Vec<Key> = episodes.found().into_iter().filter(stays).collect();
         let Tally { recorded, lost, under_way, by_limit, left_out, steps, stopped, given_up } = tally;
         let recorded: Vec<Key> = recorded.into_iter().filter(stays).collect();
         let lost: Vec<LostEpisode> = lost.into_iter().map(|(_, lost)| lost).collect();
-        store.note_lost(&[found.as_slice(), &recorded].concat(), &lost).map_err(Failure::input)?;
+        store.note_lost(&[found.as_slice(), &recorded].concat(), &lost)?;
         let answer = RecordAnswer {
             model: player.player().model().to_owned(),
             asked: planned.len(),
@@ -365,7 +365,7 @@ impl RecordArgs {
             stopped_by_limit: if by_limit { under_way.len() } else { 0 },
             spend: player.spend(),
             stopped,
-            renderers: store.renderers(&plan.experiments).map_err(Failure::input)?,
+            renderers: store.renderers(&plan.experiments)?,
             traces: files(plan, |experiment| store.trace(experiment)),
             logs: files(plan, |experiment| store.log(experiment)),
         };

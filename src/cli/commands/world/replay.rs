@@ -41,7 +41,7 @@ pub struct ReplayArgs {
 
 impl ReplayArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let files = inputs::resolve(&self.traces, io::stdin()).map_err(Failure::input)?;
+        let files = inputs::resolve(&self.traces, io::stdin())?;
         output::note_stale_checksums(&files);
         let traces = RecordedTrace::open(&files, self.episode.as_deref())?;
         if traces.len() > 1 && self.mcap.is_some() {
@@ -53,7 +53,7 @@ impl ReplayArgs {
         for trace in &traces {
             trace.replay(&self.outputs(), &mut answer, save)?;
         }
-        output::print_told(&answer, self.json, tell)?;
+        output::print_with(&answer, self.json, write_answer)?;
         Ok(if answer.divergences.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
     }
 
@@ -110,18 +110,12 @@ impl ReplayArgs {
     }
 }
 
-impl From<ReplayError> for Failure {
-    fn from(error: ReplayError) -> Self {
-        Self::input(error)
-    }
-}
-
 fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
     output::make_folder(replace::folder_of(path))?;
     output::write_file(path, png)
 }
 
-fn tell_frames(text: &mut String, frames: &FramesAnswer) -> fmt::Result {
+fn write_frames(text: &mut String, frames: &FramesAnswer) -> fmt::Result {
     let FramesAnswer { equal, alike, different, tolerance, recorded_with, drawn_with, not_compared } = frames;
     if let Some(reason) = not_compared {
         return writeln!(text, "frames are not compared: {reason}");
@@ -143,7 +137,7 @@ fn tell_frames(text: &mut String, frames: &FramesAnswer) -> fmt::Result {
     Ok(())
 }
 
-fn tell(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
+fn write_answer(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
     for Divergence { episode_id, t, column, expected, found } in &answer.divergences {
         // Hashes are enough for people.
         let [expected, found] = [expected, found].map(|text| match column.as_str() {
@@ -158,5 +152,5 @@ fn tell(text: &mut String, answer: &ReplayAnswer) -> fmt::Result {
         1 => writeln!(text, ": 1 of the episodes parts from the trace")?,
         parted => writeln!(text, ": {parted} of the episodes part from the trace")?,
     }
-    answer.frames.as_ref().map_or(Ok(()), |frames| tell_frames(text, frames))
+    answer.frames.as_ref().map_or(Ok(()), |frames| write_frames(text, frames))
 }

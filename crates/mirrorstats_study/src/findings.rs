@@ -4,9 +4,10 @@ use std::fmt::{self, Write as _};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use crate::StudyError;
 use crate::experiment_findings::experiment_findings;
 use crate::own_definitions::{Carried, carried};
-use crate::{DEFAULT_DEFINITIONS, StudyError};
+use crate::question::DEFAULT_DEFINITIONS;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_metric::definitions::Definitions;

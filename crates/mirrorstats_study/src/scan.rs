@@ -3,15 +3,14 @@
 use std::collections::BTreeSet;
 use std::thread;
 
-use crate::backend::SparkJob;
-use crate::error::StudyError;
 use crate::inputs::{self, Source};
 use crate::question::STANDING_LABELS;
 use crate::results::{Outputs, Results};
-use crate::{Backend, Study, losses, own_definitions, scores};
+use crate::spark::SparkJob;
+use crate::{Study, StudyError, losses, own_definitions, scores};
+use mirrorstats_engines::spark::Cluster;
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_score::cells::group::CONDITION;
-use mirrorstats_score::quality::{QualityByCell, QualityReader};
+use mirrorstats_score::quality::QualityReader;
 use mirrorstats_score::score_traces::{self, Scored};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, LabelColumn};
 use mirrorstats_score::vocabulary;
@@ -39,35 +38,6 @@ impl Study {
         self.declare(&mut results)?;
         results.quality = results.quality.filter(|_| outputs.quality);
         Ok(results)
-    }
-
-    /// Returns true if the traces record replies, or episodes were lost. Errors: scores, which have no replies; a list
-    /// of lost episodes that cannot be read.
-    pub fn has_quality(&self) -> Result<bool, StudyError> {
-        let reader = QualityReader::of(self.source.traces()?);
-        Ok(!reader.columns().is_empty() || !mirrorstats_trace::beside::lost::beside(&self.inputs)?.is_empty())
-    }
-
-    /// The reply quality of all episodes, lost ones included. Errors: scores, which have no replies; faults of the
-    /// traces or of the list of lost episodes.
-    pub fn quality(&self) -> Result<QualityByCell, StudyError> {
-        let traces = self.source.traces()?;
-        let reader = QualityReader::of(traces);
-        let columns = vocabulary::trace_columns(traces);
-        let all = Definitions::from_toml("all", "open = true", &columns)?;
-        let nobody = all.clone().filtered("nobody", "false", &columns)?;
-        let lost = lost_episodes(traces)?;
-        let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
-        let wanted =
-            score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader), unchecked: &UNCHECKED };
-        let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
-        let Scored { tables, quality, .. } = score_traces::score_all(traces, &definitions, wanted, self.threads)?;
-        let [episodes, ended]: [_; 2] = tables.try_into().expect("a table per definitions");
-        let lost = lost.map(|_| ids(&ended));
-        let mut results = Results { lost, quality, ..Results::of(episodes) };
-        self.declare(&mut results)?;
-        self.check_unchanged()?;
-        Ok(results.quality.unwrap_or_default())
     }
 
     pub(crate) fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
@@ -102,23 +72,26 @@ impl Study {
         Ok(results)
     }
 
+    /// The episode table, computed by Spark. Lost episodes, which Spark does not know, come from a scan. Errors: as
+    /// [`Study::score`]; scores in the place of traces; faults of Spark.
+    pub fn score_on(&self, cluster: Cluster) -> Result<EpisodeTable, StudyError> {
+        let traces = self.traces()?;
+        let episodes = SparkJob::of_study(self, cluster)?.score()?;
+        own_definitions::check(&self.question.bind(traces)?, traces, &episodes)?;
+        let mut results = Results::of(episodes);
+        if traces.column(REPLY_STATUS).is_some() {
+            let scanned = self.scan_traces(traces, Outputs { losses: true, ..Outputs::default() })?;
+            results = Results { episodes: results.episodes, ..scanned };
+        }
+        self.check_unchanged()?;
+        self.declare(&mut results)?;
+        Ok(results.episodes)
+    }
+
     fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
-        let mut results = match (&self.source, &self.backend) {
-            (Source::Scores(files), Backend::Native) => Results::of(scores::read(files, &self.question)?),
-            (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
-            (source, Backend::Spark(cluster)) => {
-                let scored = Results::of(SparkJob::of_study(self, cluster.clone())?.score()?);
-                if let Source::Traces(traces) = source {
-                    own_definitions::check(&self.question.bind(traces)?, traces, &scored.episodes)?;
-                }
-                // The other engine computes only scores; the other outputs come from a scan.
-                match source {
-                    Source::Traces(traces) if outputs.needs_steps(traces) => {
-                        Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
-                    }
-                    _ => scored,
-                }
-            }
+        let mut results = match &self.source {
+            Source::Scores(files) => Results::of(scores::read(files, &self.question)?),
+            Source::Traces(traces) => self.scan_traces(traces, outputs)?,
         };
         results.select(outputs);
         Ok(results)
@@ -154,7 +127,7 @@ fn says_something(label: &LabelColumn) -> bool {
 }
 
 /// Columns that are read beyond those of the definitions: invalid values in them do not prevent scoring.
-const UNCHECKED: [&str; 1] = [REPLY_STATUS];
+pub(crate) const UNCHECKED: [&str; 1] = [REPLY_STATUS];
 
 /// Episodes that the infrastructure ended: without `done`, their last reply lost. `None` if the traces do not record
 /// it.

@@ -5,22 +5,25 @@
 
 use std::ffi::OsStr;
 use std::fmt;
-use std::fs;
+use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::{hash, input};
-use mirrorstats_report::bundle::{self, Manifest};
+use mirrorstats_report::bundle::{self, MANIFEST, Manifest};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::SCHEMA_VERSION;
+use serde::de::DeserializeOwned;
 
 #[derive(Debug, thiserror::Error)]
 pub enum ProvenanceError {
-    #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
-    NoManifest { path: PathBuf, source: io::Error },
+    #[error("{}: expected a report's folder with its {MANIFEST}, found {found}; name the folder that `mirrorstats report` wrote", path.display())]
+    NoManifest { path: PathBuf, found: String },
     #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
     Malformed { path: PathBuf, found: String },
+    #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
+    Unreadable { path: PathBuf, source: io::Error },
     #[error("{} of {all} traces of the report have changed:\n{}\n{REMEDY}", faults.len(), lines(faults))]
     Traces { all: usize, faults: Vec<TraceFault> },
 }
@@ -70,14 +73,31 @@ fn lines(faults: &[TraceFault]) -> String {
 /// A trace takes about 200 bytes of a manifest.
 const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
 
+/// Reads what a caller needs of a report's manifest, which must be a regular file.
+pub(crate) fn read<T: DeserializeOwned>(folder: &Path) -> Result<T, ProvenanceError> {
+    let path = folder.join(MANIFEST);
+    let none = |found: String| ProvenanceError::NoManifest { path: folder.to_owned(), found };
+    let about = fs::symlink_metadata(&path).map_err(|error| none(error.to_string()))?;
+    if !about.is_file() {
+        return Err(none(kind_of(&about).to_owned()));
+    }
+    let bytes = input::bytes(&path, LARGEST);
+    let bytes = bytes.map_err(|source| ProvenanceError::Unreadable { path: path.clone(), source })?;
+    serde_json::from_slice(&bytes).map_err(|error| ProvenanceError::Malformed { path, found: error.to_string() })
+}
+
+pub(crate) fn kind_of(about: &Metadata) -> &'static str {
+    match about.file_type() {
+        kind if kind.is_symlink() => "a symbolic link",
+        kind if kind.is_dir() => "a folder",
+        kind if kind.is_file() => "a file",
+        _ => "neither a file nor a folder",
+    }
+}
+
 pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
-    let path = report.join("manifest.json");
-    let text = match input::text(&path, LARGEST) {
-        Ok(text) => text,
-        Err(source) => return Err(ProvenanceError::NoManifest { path, source }),
-    };
-    let malformed = |found: String| ProvenanceError::Malformed { path: path.clone(), found };
-    let manifest: Manifest = serde_json::from_str(&text).map_err(|error| malformed(error.to_string()))?;
+    let manifest: Manifest = read(report)?;
+    let malformed = |found: String| ProvenanceError::Malformed { path: report.join(MANIFEST), found };
     if manifest.schema_version > SCHEMA_VERSION {
         let found = format!("one over trace schema {}, newer than {SCHEMA_VERSION}", manifest.schema_version);
         return Err(malformed(found));
@@ -150,9 +170,9 @@ fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
 
 /// The places where a report's traces are searched: the given ones, else the current folder, the report's folder and
 /// its parents.
-pub(crate) fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
-    if !told.is_empty() {
-        return told.to_vec();
+pub(crate) fn places(report: &Path, given: &[PathBuf]) -> Vec<PathBuf> {
+    if !given.is_empty() {
+        return given.to_vec();
     }
     let here = PathBuf::from(".");
     let report = fs::canonicalize(report).unwrap_or_else(|_| report.to_owned());

@@ -91,55 +91,52 @@ impl PairAgreement {
     }
 }
 
-impl Study {
-    /// The labels beside the traces, and the agreement of each pair of coders at this confidence. Errors: as
-    /// [`Study::score`]; scores in the place of traces.
-    pub fn agreement(&self, confidence: f64) -> Result<LabelAgreement, StudyError> {
-        let labels = self.traces()?.labels();
-        let table = self.score()?.episodes;
-        let ids: BTreeSet<&str> = table.keys.iter().map(|key| key.episode_id).collect();
-        let coded = labels.episodes().filter(|id| ids.contains(id)).count() as u64;
-        let elsewhere = labels.episodes().count() as u64 - coded;
-        let mut coders = labels.by_coder();
-        for episodes in coders.values_mut() {
-            episodes.retain(|id, _| ids.contains(id));
-        }
-        coders.retain(|_, episodes| !episodes.is_empty());
-        let words: BTreeSet<&str> = coders.values().flat_map(BTreeMap::values).flatten().copied().collect();
-        let names: Vec<&str> = coders.keys().copied().collect();
-        let pairs = names.len() as u64 * (names.len() as u64).saturating_sub(1) / 2;
-        MOST_COMPARISONS.check(pairs.saturating_mul(words.len() as u64))?;
-        let mut agreement = Vec::new();
-        for (at, first) in names.iter().enumerate() {
-            for second in &names[at + 1..] {
-                let counts = compared(&coders[first], &coders[second], &words);
-                let of =
-                    |(label, counts): (&&str, Pairs)| PairAgreement::new(label, [*first, *second], counts, confidence);
-                agreement.extend(words.iter().zip(counts).map(of));
-            }
-        }
-        agreement.sort_by(|one, other| one.label.cmp(&other.label));
-        let mut with: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-        for (id, labels) in coders.values().flatten() {
-            for label in labels {
-                with.entry(label).or_default().insert(id);
-            }
-        }
-        Ok(LabelAgreement {
-            episodes: ids.len() as u64,
-            coded,
-            elsewhere,
-            coders: coders
-                .iter()
-                .map(|(coder, episodes)| CoderCount { coder: (*coder).to_owned(), episodes: episodes.len() as u64 })
-                .collect(),
-            labels: with
-                .into_iter()
-                .map(|(label, ids)| LabelCount { label: label.to_owned(), episodes: ids.len() as u64 })
-                .collect(),
-            agreement,
-        })
+/// The labels beside the traces, and the agreement of each pair of coders at this confidence. Errors: as
+/// [`Study::score`]; scores in the place of traces.
+pub fn agreement(study: &Study, confidence: f64) -> Result<LabelAgreement, StudyError> {
+    let labels = study.traces()?.labels();
+    let table = study.score()?.episodes;
+    let ids: BTreeSet<&str> = table.keys.iter().map(|key| key.episode_id).collect();
+    let coded = labels.episodes().filter(|id| ids.contains(id)).count() as u64;
+    let elsewhere = labels.episodes().count() as u64 - coded;
+    let mut coders = labels.by_coder();
+    for episodes in coders.values_mut() {
+        episodes.retain(|id, _| ids.contains(id));
     }
+    coders.retain(|_, episodes| !episodes.is_empty());
+    let words: BTreeSet<&str> = coders.values().flat_map(BTreeMap::values).flatten().copied().collect();
+    let names: Vec<&str> = coders.keys().copied().collect();
+    let pairs = names.len() as u64 * (names.len() as u64).saturating_sub(1) / 2;
+    MOST_COMPARISONS.check(pairs.saturating_mul(words.len() as u64))?;
+    let mut agreement = Vec::new();
+    for (at, first) in names.iter().enumerate() {
+        for second in &names[at + 1..] {
+            let counts = compared(&coders[first], &coders[second], &words);
+            let of = |(label, counts): (&&str, Pairs)| PairAgreement::new(label, [*first, *second], counts, confidence);
+            agreement.extend(words.iter().zip(counts).map(of));
+        }
+    }
+    agreement.sort_by(|one, other| one.label.cmp(&other.label));
+    let mut with: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+    for (id, labels) in coders.values().flatten() {
+        for label in labels {
+            with.entry(label).or_default().insert(id);
+        }
+    }
+    Ok(LabelAgreement {
+        episodes: ids.len() as u64,
+        coded,
+        elsewhere,
+        coders: coders
+            .iter()
+            .map(|(coder, episodes)| CoderCount { coder: (*coder).to_owned(), episodes: episodes.len() as u64 })
+            .collect(),
+        labels: with
+            .into_iter()
+            .map(|(label, ids)| LabelCount { label: label.to_owned(), episodes: ids.len() as u64 })
+            .collect(),
+        agreement,
+    })
 }
 
 /// The counts of two coders for each label, in one pass over the episodes that both coded.

@@ -5,19 +5,16 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::{self, Metadata};
-use std::io;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::provenance::{ProvenanceError, kind_of, read};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::{hash, input};
 use mirrorstats_report::bundle::{MANIFEST, Output};
-
-/// The largest manifest that is read, in bytes; the paper's has 20 KB.
-const LONGEST: u64 = 64 << 20;
 
 /// The needed part of a manifest; other versions may have more fields.
 #[derive(Deserialize)]
@@ -63,17 +60,7 @@ pub enum Kind {
     Unexpected,
 }
 
-#[derive(Debug, thiserror::Error)]
-pub enum VerifyError {
-    #[error("{}: expected a report's folder with its {MANIFEST}, found {found}; name the folder that `mirrorstats report` wrote", path.display())]
-    NoManifest { path: PathBuf, found: String },
-    #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
-    Malformed { path: PathBuf, found: String },
-    #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
-    Unreadable { path: PathBuf, source: io::Error },
-}
-
-pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
+pub fn verify(folder: &Path) -> Result<Verification, ProvenanceError> {
     let listed = listed(folder)?;
     let mut there = BTreeMap::new();
     find(folder, "", &mut there)?;
@@ -92,19 +79,9 @@ pub fn verify(folder: &Path) -> Result<Verification, VerifyError> {
     Ok(Verification { files: listed.len(), differences })
 }
 
-fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
-    let path = folder.join(MANIFEST);
-    let none = |found: String| VerifyError::NoManifest { path: folder.to_owned(), found };
-    let about = fs::symlink_metadata(&path).map_err(|error| none(error.to_string()))?;
-    if !about.is_file() {
-        return Err(none(kind_of(&about).to_owned()));
-    }
-    let malformed = |found: String| VerifyError::Malformed { path: path.clone(), found };
-    if about.len() > LONGEST {
-        return Err(malformed(format!("{} bytes, more than {LONGEST}", about.len())));
-    }
-    let bytes = fs::read(&path).map_err(|source| VerifyError::Unreadable { path: path.clone(), source })?;
-    let manifest: Listed = serde_json::from_slice(&bytes).map_err(|error| malformed(error.to_string()))?;
+fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, ProvenanceError> {
+    let malformed = |found: String| ProvenanceError::Malformed { path: folder.join(MANIFEST), found };
+    let manifest: Listed = read(folder)?;
     if manifest.outputs.is_empty() {
         return Err(malformed("one that lists no outputs".to_owned()));
     }
@@ -134,10 +111,10 @@ fn fault(output: &Output) -> Option<String> {
 }
 
 /// Collects everything in a folder except folders, by relative path.
-fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> Result<(), VerifyError> {
+fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> Result<(), ProvenanceError> {
     let unreadable = |path: &Path| {
         let path = path.to_owned();
-        move |source| VerifyError::Unreadable { path, source }
+        move |source| ProvenanceError::Unreadable { path, source }
     };
     for entry in fs::read_dir(folder).map_err(unreadable(folder))? {
         let entry = entry.map_err(unreadable(folder))?;
@@ -157,7 +134,7 @@ fn difference(
     path: &str,
     output: &Output,
     there: Option<Metadata>,
-) -> Result<Option<Difference>, VerifyError> {
+) -> Result<Option<Difference>, ProvenanceError> {
     let expected = format!("{} bytes with the SHA-256 {}", output.bytes, output.sha256);
     let differs =
         |kind, found: String| Ok(Some(Difference { path: path.to_owned(), kind, expected: expected.clone(), found }));
@@ -166,21 +143,13 @@ fn difference(
         return differs(Kind::Changed, kind_of(&about).to_owned());
     }
     let at = folder.join(path);
-    let found =
-        input::open(&at).and_then(hash::of_reader).map_err(|source| VerifyError::Unreadable { path: at, source })?;
+    let found = input::open(&at)
+        .and_then(hash::of_reader)
+        .map_err(|source| ProvenanceError::Unreadable { path: at, source })?;
     if found == output.sha256.to_ascii_lowercase() && about.len() == output.bytes {
         return Ok(None);
     }
     differs(Kind::Changed, format!("{} bytes with the SHA-256 {found}", about.len()))
-}
-
-fn kind_of(about: &Metadata) -> &'static str {
-    match about.file_type() {
-        kind if kind.is_symlink() => "a symbolic link",
-        kind if kind.is_dir() => "a folder",
-        kind if kind.is_file() => "a file",
-        _ => "neither a file nor a folder",
-    }
 }
 
 impl Verification {

@@ -6,8 +6,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::error::StudyError;
-use crate::{DEFAULT_DEFINITIONS, Question, Study};
+use crate::StudyError;
+use crate::question::{DEFAULT_DEFINITIONS, Question};
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::file;
@@ -131,7 +131,7 @@ fn groups(traces: &TraceSet) -> Vec<ScoredAlike> {
 }
 
 /// The definitions that score all experiments of some traces as their own definitions do; `None` for the default ones.
-fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
+pub(crate) fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
     let groups = groups(traces);
     match &groups[..] {
         [] => Ok(None),
@@ -220,28 +220,4 @@ pub(crate) fn unscored(
     let (experiment, own) = not_scored.find(|(name, _)| is_kept(name))?;
     let (experiment, definitions) = (experiment.clone(), definitions.catalog.name.clone());
     Some(StudyError::NotScored { experiment, definitions, own })
-}
-
-impl Study {
-    /// The experiments by their definitions, if each is scored by its own; else empty.
-    pub fn parts(&self) -> &[ScoredAlike] {
-        &self.question.parts
-    }
-
-    /// The definitions that score all experiments of the traces, named by their footers; `None` for the default ones.
-    /// Errors: scores in the place of traces; experiments that need different definitions; definitions in a file of the
-    /// recorder's.
-    pub fn own_definitions(&self) -> Result<Option<PathBuf>, StudyError> {
-        chosen(self.traces()?)
-    }
-
-    pub fn definitions_name(&self) -> &Path {
-        self.question.definitions_name()
-    }
-
-    /// A note if the definitions are those that the traces carry.
-    pub fn carried_note(&self) -> Option<String> {
-        let carried = self.question.carried.as_ref()?;
-        Some(format!("the definitions `{}` are those that the traces carry; --definitions names others", carried.name))
-    }
 }

@@ -6,7 +6,7 @@ use std::io::{self, Read};
 use std::path::PathBuf;
 use std::time::{Duration, UNIX_EPOCH};
 
-use crate::error::StudyError;
+use crate::StudyError;
 use mirrorstats_engines::spark::source::is_uri;
 use mirrorstats_exact::hash;
 use mirrorstats_report::bundle;

@@ -9,9 +9,10 @@ use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use crate::error::StudyError;
 use crate::inputs::{ScoreFile, Source, Stamp};
-use crate::{LostAs, Question, Study, own_definitions, scores};
+use crate::losses::LostAs;
+use crate::question::Question;
+use crate::{Study, StudyError, own_definitions, scores};
 use mirrorstats_analysis::changes::{Changes, Flip, Overlap};
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_report::layout::TableOrder;
@@ -109,36 +110,33 @@ pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> 
     Ok(Diff { changes, notes })
 }
 
-impl Study {
-    /// The changes from this study to another: cells, and episodes by their ids. Two studies of the same traces under
-    /// one filter are scored in one scan, which gives the timesteps that decided each difference. Other studies lack
-    /// these timesteps, and a note says so. Errors: as [`Study::score`] for either study; sums of squares beyond 128
-    /// bits.
-    pub fn diff(&self, other: &Self) -> Result<Diff, StudyError> {
-        let by = self.question.by.clone().unwrap_or_else(|| DEFAULT_BY.map(str::to_owned).to_vec());
-        if self.differs_in_definitions_alone(other) {
-            let side = |study: &Self| Side::Definitions(study.question.definitions_name().to_owned());
-            let (metrics, filter) = (self.question.metrics.clone(), self.question.filter.clone());
-            let request = DiffRequest { metrics, filter, by, threads: self.threads, ..DiffRequest::default() };
-            return diff(&side(self), &side(other), &self.inputs, &request);
-        }
-        let style = Style::load("default")?;
-        let [before, after] = [self.score()?, other.score()?].map(|results| Scored::of(results.episodes, None));
-        let changes = Pair { before, after, evidence: None }.of_common_metrics().changes(&by, &style)?;
-        let notes = if changes.flips.is_empty() {
-            Vec::new()
-        } else {
-            let why = "the two studies are not of the same traces under one filter";
-            vec![format!("the timesteps that decided are not known: {why}")]
-        };
-        Ok(Diff { changes, notes })
+/// The changes from one study to another: cells, and episodes by their ids. Two studies of the same traces under one
+/// filter are scored in one scan, which gives the timesteps that decided each difference. Other studies lack these
+/// timesteps, and a note says so. Errors: as [`Study::score`] for either study; sums of squares beyond 128 bits.
+pub fn diff_studies(before: &Study, after: &Study) -> Result<Diff, StudyError> {
+    let by = before.question.by.clone().unwrap_or_else(|| DEFAULT_BY.map(str::to_owned).to_vec());
+    if differ_in_definitions_alone(before, after) {
+        let side = |study: &Study| Side::Definitions(study.question.definitions_name().to_owned());
+        let (metrics, filter) = (before.question.metrics.clone(), before.question.filter.clone());
+        let request = DiffRequest { metrics, filter, by, threads: before.threads, ..DiffRequest::default() };
+        return diff(&side(before), &side(after), &before.inputs, &request);
     }
+    let style = Style::load("default")?;
+    let [mut before, mut after] = [before.score()?, after.score()?].map(|results| Scored::of(results.episodes, None));
+    let common: Vec<String> = after.metrics.iter().filter(|name| before.metrics.contains(name)).cloned().collect();
+    for side in [&mut before, &mut after] {
+        side.table.metrics.retain(|metric| common.contains(&metric.name));
+    }
+    let changes = Pair { before, after, evidence: None }.changes(&by, &style)?;
+    let why = "the two studies are not of the same traces under one filter";
+    let note = (!changes.flips.is_empty()).then(|| format!("the timesteps that decided are not known: {why}"));
+    Ok(Diff { changes, notes: note.into_iter().collect() })
+}
 
-    fn differs_in_definitions_alone(&self, other: &Self) -> bool {
-        let question = |study: &Self| Question { definitions: None, ..study.question.clone() };
-        let are_traces = [self, other].iter().all(|study| matches!(study.source, Source::Traces(_)));
-        are_traces && self.stamps == other.stamps && question(self) == question(other)
-    }
+fn differ_in_definitions_alone(one: &Study, other: &Study) -> bool {
+    let question = |study: &Study| Question { definitions: None, ..study.question.clone() };
+    let are_traces = [one, other].iter().all(|study| matches!(study.source, Source::Traces(_)));
+    are_traces && one.stamps == other.stamps && question(one) == question(other)
 }
 
 impl Side {
@@ -206,33 +204,35 @@ impl Side {
         }
     }
 
-    fn bind(
+    /// The scores with these metrics, or what computes them.
+    fn half<'t>(
         &self,
+        table: Option<EpisodeTable>,
         common: &[String],
-        traces: Option<&TraceSet>,
+        traces: Option<&'t TraceSet>,
         request: &DiffRequest,
-    ) -> Result<Option<Definitions>, StudyError> {
-        match (self, traces) {
-            (Self::Scores(_), _) => Ok(None),
-            (Self::Definitions(name), None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
-            (Self::Definitions(_), Some(traces)) => {
-                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
-                question.bind(traces).map(Some)
+    ) -> Result<Half<'t>, StudyError> {
+        match (self, table, traces) {
+            (_, Some(mut table), _) => {
+                table.metrics.retain(|metric| common.contains(&metric.name));
+                Ok(Half::Scores(Box::new(table)))
             }
+            (_, None, Some(traces)) => {
+                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
+                Ok(Half::Definitions(Box::new(question.bind(traces)?), traces))
+            }
+            (Self::Definitions(name), None, None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
+            (Self::Scores(_), None, None) => Err(StudyError::NoScores),
         }
     }
 }
 
-impl Pair {
-    fn of_common_metrics(mut self) -> Self {
-        let common: Vec<String> =
-            self.after.metrics.iter().filter(|name| self.before.metrics.contains(name)).cloned().collect();
-        for side in [&mut self.before, &mut self.after] {
-            side.table.metrics.retain(|metric| common.contains(&metric.name));
-        }
-        self
-    }
+enum Half<'t> {
+    Scores(Box<EpisodeTable>),
+    Definitions(Box<Definitions>, &'t TraceSet),
+}
 
+impl Pair {
     fn score(old: &Side, new: &Side, traces: Option<&TraceSet>, request: &DiffRequest) -> Result<Self, StudyError> {
         let (old_metrics, old_table) = old.read(traces, request)?;
         let (new_metrics, new_table) = new.read(traces, request)?;
@@ -241,20 +241,28 @@ impl Pair {
         let [before, after] =
             [old_metrics, new_metrics].map(|names| names.into_iter().filter(wanted).collect::<Vec<String>>());
         let common: Vec<String> = after.iter().filter(|name| before.contains(name)).cloned().collect();
-        let of_common = |table: Option<EpisodeTable>| {
-            table.map(|mut table| {
-                table.metrics.retain(|metric| common.contains(&metric.name));
-                table
-            })
+        let halves = [old.half(old_table, &common, traces, request)?, new.half(new_table, &common, traces, request)?];
+        let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
+        let score = |half| match half {
+            Half::Scores(table) => Ok((*table, None)),
+            Half::Definitions(definitions, traces) => {
+                let table = score_traces::score(traces, &definitions, &labels, request.threads)?;
+                Ok::<_, StudyError>((table, Some(*definitions)))
+            }
         };
-        let definitions = [old.bind(&common, traces, request)?, new.bind(&common, traces, request)?];
-        let (tables, evidence) =
-            score_sides(&definitions, [of_common(old_table), of_common(new_table)], traces, request)?;
-        let ([old_definitions, new_definitions], [old_table, new_table]) = (definitions, tables);
+        let ([(old, old_definitions), (new, new_definitions)], evidence) = match halves {
+            // One scan scores both.
+            [Half::Definitions(old, traces), Half::Definitions(new, _)] => {
+                let flips::ScoredPair { tables: [before, after], evidence } =
+                    flips::score_pair(traces, [&old, &new], &labels, request.threads)?;
+                ([(before, Some(*old)), (after, Some(*new))], Some(evidence))
+            }
+            [old, new] => ([score(old)?, score(new)?], None),
+        };
         Ok(Self {
             evidence,
-            before: Scored { table: old_table, metrics: before, definitions: old_definitions },
-            after: Scored { table: new_table, metrics: after, definitions: new_definitions },
+            before: Scored { table: old, metrics: before, definitions: old_definitions },
+            after: Scored { table: new, metrics: after, definitions: new_definitions },
         })
     }
 
@@ -326,28 +334,6 @@ impl Scored {
                 Ok(definitions)
             }
         }
-    }
-}
-
-type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
-
-fn score_sides(
-    definitions: &[Option<Definitions>; 2],
-    read: [Option<EpisodeTable>; 2],
-    traces: Option<&TraceSet>,
-    request: &DiffRequest,
-) -> Result<ScoredSides, StudyError> {
-    let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
-    let score = |traces, definitions| score_traces::score(traces, definitions, &labels, request.threads);
-    match (definitions, read, traces) {
-        ([None, None], [Some(old), Some(new)], _) => Ok(([old, new], None)),
-        ([Some(old), Some(new)], _, Some(traces)) => {
-            let pair = flips::score_pair(traces, [old, new], &labels, request.threads)?;
-            Ok((pair.tables, Some(pair.evidence)))
-        }
-        ([Some(old), None], [_, Some(new)], Some(traces)) => Ok(([score(traces, old)?, new], None)),
-        ([None, Some(new)], [Some(old), _], Some(traces)) => Ok(([old, score(traces, new)?], None)),
-        _ => Err(StudyError::NoScores),
     }
 }
 

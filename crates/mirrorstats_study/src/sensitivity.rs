@@ -7,17 +7,17 @@
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
-use crate::error::StudyError;
 use crate::losses::{self, Counted};
+use crate::question::Question;
 use crate::results::Results;
 use crate::scan::{ids, lost_episodes};
-use crate::{Question, Study, own_definitions};
+use crate::statistics::statistics;
+use crate::{Study, StudyError, own_definitions};
 use mirrorstats_analysis::statistics::Options;
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::{Definitions, ReplaceError};
 use mirrorstats_report::sensitivity::{Level, Reference, Sensitivity};
 use mirrorstats_report::style::Style;
-use mirrorstats_score::cells::{Cells, Group};
 use mirrorstats_score::physical::PhysicalPlan;
 use mirrorstats_score::score_traces::{self, Outputs};
 use mirrorstats_score::tables::table::EpisodeTable;
@@ -64,66 +64,59 @@ pub struct SensitivityReport {
     pub notes: Vec<String>,
 }
 
-impl Study {
-    /// Scores the study under each threshold of mirror evidence and under the unchanged definitions, in one scan.
-    /// Errors: as [`Study::statistics`]; scores, or traces that do not record `mirror_self_px` at every step;
-    /// definitions without a `let` named `visible` that is true or false at each step; metrics that do not depend on
-    /// it.
-    pub fn sensitivity(&self, thresholds: &Thresholds) -> Result<SensitivityReport, StudyError> {
-        let traces = self.source.traces()?;
-        check_pixels(traces)?;
-        let style = Style::load("default")?;
-        let trial = Trial::of(&self.question, traces, thresholds)?;
-        let scored = self.scan_trial(&trial, traces);
-        self.check_unchanged()?;
-        let stages = self.stages(&trial, scored?)?;
-        let lost = stages.first().map_or(0, |(_, lost)| *lost);
-        let levels: Vec<Level> = stages.into_iter().map(|(level, _)| level).collect();
-        let found = Sensitivity::from_levels(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
-        Ok(SensitivityReport { found, notes: trial.notes(lost) })
-    }
+/// Scores a study under each threshold of mirror evidence and under the unchanged definitions, in one scan. Errors: as
+/// [`statistics`]; scores, or traces that do not record `mirror_self_px` at every step; definitions without a `let`
+/// named `visible` that is true or false at each step; metrics that do not depend on it.
+pub fn sensitivity(study: &Study, thresholds: &Thresholds) -> Result<SensitivityReport, StudyError> {
+    let traces = study.traces()?;
+    check_pixels(traces)?;
+    let style = Style::load("default")?;
+    let trial = Trial::of(&study.question, traces, thresholds)?;
+    let scored = scan(study, &trial, traces);
+    study.check_unchanged()?;
+    let stages = stages(study, &trial, scored?)?;
+    let lost = stages.first().map_or(0, |(_, lost)| *lost);
+    let levels: Vec<Level> = stages.into_iter().map(|(level, _)| level).collect();
+    let found = Sensitivity::from_levels(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
+    Ok(SensitivityReport { found, notes: trial.notes(lost) })
+}
 
-    fn scan_trial(&self, trial: &Trial, traces: &TraceSet) -> Result<Vec<EpisodeTable>, StudyError> {
-        let labels = self.question.labels_over(traces);
-        let outputs = Outputs { labels: &labels, ..Outputs::default() };
-        let all: Vec<&Definitions> =
-            trial.definitions.iter().chain([&trial.pixels]).chain(trial.lost.as_ref()).collect();
-        let tables = score_traces::score_all(traces, &all, outputs, self.threads)?.tables;
-        tables.first().map_or(Ok(()), |table| own_definitions::check(&trial.definitions[0], traces, table))?;
-        Ok(tables)
-    }
+fn scan(study: &Study, trial: &Trial, traces: &TraceSet) -> Result<Vec<EpisodeTable>, StudyError> {
+    let labels = study.question.labels_over(traces);
+    let outputs = Outputs { labels: &labels, ..Outputs::default() };
+    let all: Vec<&Definitions> = trial.definitions.iter().chain([&trial.pixels]).chain(trial.lost.as_ref()).collect();
+    let tables = score_traces::score_all(traces, &all, outputs, study.threads)?.tables;
+    tables.first().map_or(Ok(()), |table| own_definitions::check(&trial.definitions[0], traces, table))?;
+    Ok(tables)
+}
 
-    /// The results of each threshold, with the number of lost episodes.
-    fn stages(&self, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<(Level, u64)>, StudyError> {
-        let mut others = tables.split_off(trial.definitions.len()).into_iter();
-        let pixels = others.next();
-        let lost = others.next().map(|table| ids(&table));
-        self.check_filter(tables.iter().map(EpisodeTable::len).max().unwrap_or(0))?;
-        let counted: Vec<Counted> = tables
-            .into_iter()
-            .map(|table| self.counted_table(table, lost.clone()))
-            .collect::<Result<_, StudyError>>()?;
-        if let Some(pixels) = &pixels {
-            check_values(pixels, counted.iter().map(|counted| &counted.results.episodes))?;
-        }
-        let px = [None].into_iter().chain(trial.thresholds.iter().copied().map(Some));
-        px.zip(counted).map(|(px, counted)| self.stage(px, &counted)).collect()
+/// The results of each threshold, with the number of lost episodes.
+fn stages(study: &Study, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<(Level, u64)>, StudyError> {
+    let mut others = tables.split_off(trial.definitions.len()).into_iter();
+    let pixels = others.next();
+    let lost = others.next().map(|table| ids(&table));
+    study.check_filter(tables.iter().map(EpisodeTable::len).max().unwrap_or(0))?;
+    let counted = |table| {
+        let mut results = Results { lost: lost.clone(), ..Results::of(table) };
+        study.declare(&mut results)?;
+        Ok(Counted::of(results, study.question.lost))
+    };
+    let counted: Vec<Counted> = tables.into_iter().map(counted).collect::<Result<_, StudyError>>()?;
+    if let Some(pixels) = &pixels {
+        check_values(pixels, counted.iter().map(|counted| &counted.results.episodes))?;
     }
+    let px = [None].into_iter().chain(trial.thresholds.iter().copied().map(Some));
+    px.zip(counted).map(|(px, counted)| stage(study, px, counted)).collect()
+}
 
-    fn counted_table(&self, table: EpisodeTable, lost: Option<BTreeSet<String>>) -> Result<Counted, StudyError> {
-        let mut results = Results { lost, ..Results::of(table) };
-        self.declare(&mut results)?;
-        Ok(self.counted(results))
-    }
-
-    fn stage(&self, px: Option<u32>, counted: &Counted) -> Result<(Level, u64), StudyError> {
-        let cells = self.cells_of(&counted.results.episodes)?;
-        // Conclusions need no intervals of cells; their bootstraps would take most of the time.
-        let none = |group: &Group| Group { moments: Vec::new(), ..group.clone() };
-        let bare = Cells { metrics: Vec::new(), groups: cells.groups.iter().map(none).collect(), ..cells.clone() };
-        let statistics = self.statistics_of(counted, &bare, &Options::default())?;
-        Ok((Level { px, cells, statistics }, counted.lost.total()))
-    }
+fn stage(study: &Study, px: Option<u32>, counted: Counted) -> Result<(Level, u64), StudyError> {
+    let mut grouped = study.group(counted)?;
+    let cells = grouped.cells.clone();
+    // Conclusions need no intervals of cells; their bootstraps would take most of the time.
+    grouped.cells.metrics.clear();
+    grouped.cells.groups.iter_mut().for_each(|group| group.moments.clear());
+    let statistics = statistics(&grouped, &Options::default())?;
+    Ok((Level { px, cells, statistics }, grouped.counted.lost.total()))
 }
 
 struct Trial {
@@ -172,7 +165,7 @@ impl Trial {
             notes.push(format!("the filter depends on `{EVIDENCE}`: each threshold keeps its own episodes"));
         }
         if lost > 0 {
-            notes.push(format!("{}: in no denominator", losses::told(lost)));
+            notes.push(format!("{}: in no denominator", losses::lost_episodes(lost)));
         }
         notes
     }

@@ -1,25 +1,16 @@
-//! The scoring backend: the native kernels, or the SQL lowering on Spark. The results are the same.
+//! Scores by the SQL lowering on Spark. The results are those of the native kernels.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use super::error::StudyError;
-use super::{Question, Study};
+use crate::question::Question;
+use crate::{Study, StudyError};
 use mirrorstats_engines::spark::source::{Sources, is_uri};
 use mirrorstats_engines::spark::{self, Cluster, Job, SparkError, Written};
 use mirrorstats_exact::replace::check_target;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::vocabulary::check_label;
-
-#[derive(Clone, Debug, Default)]
-pub enum Backend {
-    /// The native kernels.
-    #[default]
-    Native,
-    /// The SQL lowering on the user's own Spark.
-    Spark(Cluster),
-}
 
 /// A job for Spark, checked as far as possible without Spark.
 #[derive(Debug)]
@@ -33,7 +24,7 @@ pub struct SparkJob {
 
 impl SparkJob {
     pub fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
-        let traces = study.source.traces()?;
+        let traces = study.traces()?;
         let mut labels = study.question.labels_over(traces);
         labels.retain(|label| !traces.is_label_column(label));
         labels.iter().try_for_each(|label| check_label(traces, label))?;

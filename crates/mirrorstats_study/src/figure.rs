@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use crate::error::StudyError;
-use crate::results::Results;
+use crate::gate::{check_metric, leading_metric};
+use crate::results::{Outputs, Results};
+use crate::{Study, StudyError};
 use mirrorstats_figures::{Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle::OutputFile;
@@ -33,6 +34,26 @@ impl Default for FigureOptions {
     }
 }
 
+/// One figure, with the models in the order of a style. Errors: as [`Study::score`]; inputs that lack data for the
+/// figure; a wrong number of metrics; a width that its text does not fit in at 6 pt.
+pub fn figure(study: &Study, name: FigureName, options: &FigureOptions) -> Result<Figure, StudyError> {
+    let mut style = Style::load(&options.style)?;
+    if let Some(metrics) = &options.metrics {
+        name.check_count(metrics.len())?;
+        style.sheet.figure.entry(name.name().to_owned()).or_default().metrics = Some(metrics.clone());
+    }
+    let grouped = study.grouped_with(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
+    let mut results = grouped.counted.results;
+    for metric in options.metrics.iter().flatten() {
+        check_metric(&results.episodes, metric)?;
+    }
+    if let Some(top) = options.top {
+        let metric = options.metrics.iter().flatten().next().cloned();
+        results = results.top_models(top, &metric.map_or_else(|| leading_metric(study), Ok)?);
+    }
+    Ok(FigureInputs { options: options.clone(), ..FigureInputs::of(&results, &style)? }.draw(name)?)
+}
+
 #[derive(Debug)]
 pub(crate) struct FigureInputs<'a> {
     cells: Cells,
@@ -55,7 +76,7 @@ pub(crate) struct Drawings {
 
 impl<'a> FigureInputs<'a> {
     /// Groups the episodes for figures: by experiment and model, with another condition as a model of its own.
-    pub(crate) fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+    fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
         Ok(Self { cells, style, options: FigureOptions::default(), results, remark: None })
@@ -73,11 +94,7 @@ impl<'a> FigureInputs<'a> {
         Ok(Self { cells, style, options: FigureOptions::default(), results, remark: Some(remark) })
     }
 
-    pub(crate) fn with(self, options: FigureOptions) -> Self {
-        Self { options, ..self }
-    }
-
-    pub(crate) fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
+    fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
         mirrorstats_figures::draw(name, &self.input())
     }
 

@@ -6,9 +6,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use crate::error::StudyError;
 use crate::inputs::Source;
-use crate::{Question, Study, scores};
+use crate::question::Question;
+use crate::{Study, StudyError, scores};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_metric::names::mentioned;

@@ -3,11 +3,15 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use crate::error::StudyError;
-use crate::figure_inputs::{Drawings, FigureInputs};
-use crate::losses::{self, Counted};
+use crate::copies::copies;
+use crate::figure::{Drawings, FigureInputs};
+use crate::grouped::Grouped;
+use crate::inputs::Source;
+use crate::losses::{Counted, LostAs, lost_episodes};
+use crate::question::DEFAULT_DEFINITIONS;
 use crate::results::{Outputs, Results};
-use crate::{DEFAULT_DEFINITIONS, LostAs, Source, Study, scores};
+use crate::statistics::{departed, selection, statistics};
+use crate::{Study, StudyError, scores};
 use mirrorstats_analysis::plan::departures::Looks;
 use mirrorstats_analysis::statistics::{Options, Statistics};
 use mirrorstats_exact::replace;
@@ -75,93 +79,80 @@ pub struct WrittenReport {
     pub manifest: Manifest,
 }
 
-impl Study {
-    /// Refuses a folder whose report contains a file that this study reads, before anything is read. Errors: an input
-    /// in the folder.
-    pub fn check_folder(&self, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
-        bundle::check_old(out, &self.files_read(Some(&options.style)))?;
-        self.check_out(out)
-    }
+/// Refuses a folder whose report contains a file that this study reads, before anything is read. Errors: an input in
+/// the folder.
+pub fn check_folder(study: &Study, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
+    bundle::check_old(out, &study.files_read(Some(&options.style)))?;
+    study.check_out(out)
+}
 
-    /// Makes the report of the study.
-    pub fn report(&self, options: &ReportOptions) -> Result<Report, StudyError> {
-        // Small files first: a mistake in the style should not cost a scan of the traces.
-        let style = Style::load(&options.style)?;
-        let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
-        let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
-        let results = self.scan(outputs)?;
-        self.check_filter(results.episodes.len())?;
-        let counted = self.counted(results);
-        let cells = self.cells_of(&counted.results.episodes)?;
-        let statistics =
-            options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
-        let replies = counted.replies();
-        let Counted { results, all, lost } = counted;
-        let (tables, ranks) = self.tables(&results.episodes, (&lost, replies.as_ref()), &cells, &style)?;
-        let replies = replies.and_then(|replies| replies.sentence());
-        let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
-        let filter = self.question.filter.clone();
-        let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
-        let mut notes = self.notes(&results, &lost);
-        notes.extend(self.copies(&results.episodes)?.map(|copies| copies.sentence));
-        let own = Options { selection: self.selection(&results.episodes), ..Options::default() };
-        let departures = self.departures(&results.episodes, &own, Looks::Once).into_iter().flatten();
-        notes.extend(departures.map(|departure| format!("departure from the registered plan: {departure}")));
-        let (illustrations, read) = (Vec::new(), self.files_read(Some(&options.style)));
-        let (threads, recordings) = (self.threads, self.recordings(&manifest));
-        let mut report = Report {
-            results,
-            all,
-            cells,
-            tables,
-            lists,
-            manifest,
-            replies,
-            notes,
-            style,
-            threads,
-            recordings,
-            illustrations,
-            read,
-            inputs: self.inputs.len(),
+/// Makes the report of a study.
+pub fn report(study: &Study, options: &ReportOptions) -> Result<Report, StudyError> {
+    // Small files first: a mistake in the style should not cost a scan of the traces.
+    let style = Style::load(&options.style)?;
+    let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
+    let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
+    let grouped = study.grouped_with(outputs)?;
+    let statistics = options.figures.then(|| statistics(&grouped, &Options::default())).transpose()?;
+    let (tables, ranks) = grouped.tables(&style)?;
+    let Grouped { counted, cells, .. } = grouped;
+    let replies = counted.replies().and_then(|replies| replies.sentence());
+    let Counted { results, all, lost } = counted;
+    let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
+    let filter = study.question.filter.clone();
+    let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
+    let mut report = Report {
+        notes: notes(study, &results, &lost)?,
+        recordings: recordings(study, &manifest),
+        results,
+        all,
+        cells,
+        tables,
+        lists,
+        manifest,
+        replies,
+        style,
+        threads: study.threads,
+        illustrations: Vec::new(),
+        read: study.files_read(Some(&options.style)),
+        inputs: study.inputs.len(),
+    };
+    if let Some(statistics) = &statistics {
+        report.illustrate(statistics)?;
+    }
+    Ok(report)
+}
+
+fn recordings(study: &Study, manifest: &Manifest) -> Option<Recordings> {
+    let Source::Traces(_) = &study.source else { return None };
+    // As in manifests: without absolute paths.
+    let named = |path: &PathBuf| bundle::InputFile::new(path, String::new(), 0).path;
+    Some(Recordings {
+        paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
+        definitions: study.question.definitions.as_ref().map(named).filter(|name| name != DEFAULT_DEFINITIONS),
+    })
+}
+
+fn notes(study: &Study, results: &Results, lost: &LostCounts) -> Result<Vec<String>, StudyError> {
+    let episodes = &results.episodes;
+    let mut notes: Vec<String> = undeclared(episodes).into_iter().chain(registered(episodes)).collect();
+    if let Source::Traces(set) = &study.source {
+        notes.extend(missing_note(set.files()));
+        notes.extend(answered::by_others(set.files()));
+        notes.extend(renderer::note(&renderer::of_files(set.files())));
+    }
+    if lost.total() > 0 {
+        let counted = match study.question.lost {
+            LostAs::Nothing => "in no denominator (--lost as-failure counts them)",
+            LostAs::Failure => "counted as failures",
         };
-        if let Some(statistics) = &statistics {
-            report.illustrate(statistics)?;
-        }
-        Ok(report)
+        notes.push(format!("{}: {counted}; see tables/quality.md", lost_episodes(lost.total())));
     }
-
-    fn recordings(&self, manifest: &Manifest) -> Option<Recordings> {
-        let Source::Traces(_) = &self.source else { return None };
-        // As in manifests: without absolute paths.
-        let named = |path: &PathBuf| bundle::InputFile::new(path, String::new(), 0).path;
-        Some(Recordings {
-            paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
-            definitions: self.question.definitions.as_ref().map(named).filter(|name| name != DEFAULT_DEFINITIONS),
-        })
-    }
-
-    fn notes(&self, results: &Results, lost: &LostCounts) -> Vec<String> {
-        let mut notes = Vec::new();
-        if let Some(undeclared) = undeclared(&results.episodes) {
-            notes.push(undeclared);
-        }
-        notes.extend(registered(&results.episodes));
-        notes.extend(self.source.traces().ok().and_then(|traces| missing_note(traces.files())));
-        if let Source::Traces(set) = &self.source {
-            notes.extend(answered::by_others(set.files()));
-            notes.extend(renderer::note(&renderer::of_files(set.files())));
-        }
-        let total = lost.total();
-        if total > 0 {
-            let counted = match self.question.lost {
-                LostAs::Nothing => "in no denominator (--lost as-failure counts them)",
-                LostAs::Failure => "counted as failures",
-            };
-            notes.push(format!("{}: {counted}; see tables/quality.md", losses::told(total)));
-        }
-        notes
-    }
+    notes.extend(copies(study, episodes)?.map(|copies| copies.sentence));
+    let own = Options { selection: selection(study, episodes), ..Options::default() };
+    let departures = departed(study, episodes, &own, Looks::Once).into_iter().flatten();
+    notes.extend(departures.map(|departure| format!("departure from the registered plan: {departure}")));
+    Ok(notes)
 }
 
 /// Says whether the analysis matches the plan registered before the recording; `None` without a plan.
@@ -207,11 +198,6 @@ impl Report {
                 (self.style.name.clone(), known().collect::<Vec<_>>().join(", "), hint(name, known()));
             StudyError::NoTable { name: name.to_owned(), style, known, hint }
         })
-    }
-
-    /// A table as Markdown; `None` if the style has no table of this name.
-    pub fn markdown(&self, name: &str) -> Option<String> {
-        self.tables.iter().find(|table| table.name == name).map(|table| table.printed().markdown())
     }
 
     /// Writes the folder of the report and replaces an existing report. Errors: `out` is not a folder or cannot be

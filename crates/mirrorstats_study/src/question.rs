@@ -40,7 +40,7 @@ pub struct Question {
 }
 
 impl Question {
-    pub(crate) fn definitions_name(&self) -> &Path {
+    pub fn definitions_name(&self) -> &Path {
         let carried = || self.carried.as_ref().map_or(DEFAULT_DEFINITIONS, |carried| &carried.name);
         self.definitions.as_deref().unwrap_or_else(|| Path::new(carried()))
     }

@@ -7,9 +7,10 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use crate::diff::{Diff, Pair, Scored};
-use crate::error::StudyError;
-use crate::report::{Report, ReportOptions};
-use crate::{LostAs, Question, Study, provenance};
+use crate::losses::LostAs;
+use crate::question::Question;
+use crate::report::{Report, ReportOptions, check_folder, report};
+use crate::{Study, StudyError, provenance};
 use mirrorstats_exact::input;
 use mirrorstats_report::bundle::Manifest;
 use mirrorstats_report::style::Style;
@@ -55,10 +56,10 @@ impl RescoreRequest {
         let figures = self.report.join("figures").is_dir() || self.report.join("report.html").is_file();
         let options = ReportOptions { style: self.style(&manifest)?, figures };
         let study = Study::of(self.traces.clone())?.threads(self.threads).asked(self.question(&manifest))?;
-        study.source.traces()?;
-        study.check_folder(&self.out, &options)?;
+        study.traces()?;
+        check_folder(&study, &self.out, &options)?;
         let before = self.scores_before(&manifest);
-        let mut report = study.report(&options)?;
+        let mut report = report(&study, &options)?;
         report.notes.extend(study.stale_checksums());
         let changes = match before {
             Ok(before) => Ok(changes(&study, before, &report)?),
@@ -127,7 +128,7 @@ fn beside(report: &Path) -> Result<PathBuf, StudyError> {
 }
 
 fn changes(study: &Study, before: EpisodeTable, report: &Report) -> Result<Diff, StudyError> {
-    let traces = study.source.traces()?;
+    let traces = study.traces()?;
     let after = Scored::of(report.results.episodes.clone(), Some(study.question.bind(traces)?));
     let pair = Pair { before: Scored::of(before, None), after, evidence: None };
     let mut changes = pair.changes(&report.cells.by, &report.style)?;

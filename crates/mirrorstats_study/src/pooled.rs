@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::error::StudyError;
+use crate::StudyError;
 use mirrorstats_analysis::comparable::{FINGERPRINT, Recorded, Varied, difference};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_score::cells::group::{CONDITION, membership};
@@ -36,14 +36,14 @@ pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyErro
 }
 
 /// The mixtures in pooled cells, one sentence each; empty without any.
-pub(crate) fn told(table: &EpisodeTable, by: &[String]) -> Result<Vec<String>, StudyError> {
+pub(crate) fn mixtures(table: &EpisodeTable, by: &[String]) -> Result<Vec<String>, StudyError> {
     let groups = membership(table, by)?;
-    let told = |rows: &[usize; 2]| {
+    let words = |rows: &[usize; 2]| {
         let key = table.keys.get(rows[0]);
         let (experiment, model) = (visible(key.experiment), visible(key.model));
         format!("{experiment}, {model}: pooled with --pool: {}.", differences(table, *rows))
     };
-    Ok(mixed(table, &groups).iter().map(told).collect())
+    Ok(mixed(table, &groups).iter().map(words).collect())
 }
 
 fn differences(table: &EpisodeTable, rows: [usize; 2]) -> String {

@@ -4,9 +4,9 @@ use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use crate::Question;
-use crate::error::StudyError;
+use crate::StudyError;
 use crate::inputs::ScoreFile;
+use crate::question::Question;
 use mirrorstats_exact::input;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::format::{self, Format, Partition};

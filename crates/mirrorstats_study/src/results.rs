@@ -11,8 +11,6 @@ use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::quality::QualityByCell;
 use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
 use mirrorstats_score::timeline::Timeline;
-use mirrorstats_trace::read::open::TraceSet;
-use mirrorstats_trace::validate::replies::REPLY_STATUS;
 
 /// The requested results besides the episode table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,11 +32,6 @@ impl Outputs {
     pub fn of_figures(names: &[FigureName]) -> Self {
         let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
         Self { timelines, outcomes, ..Self::default() }
-    }
-
-    pub(crate) fn needs_steps(self, traces: &TraceSet) -> bool {
-        let has_losses = self.losses && traces.column(REPLY_STATUS).is_some();
-        self.timelines || self.outcomes || self.quality || has_losses
     }
 }
 

@@ -107,9 +107,9 @@ fn a_key_in_place_of_its_variable_is_refused_and_not_repeated() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("own.toml");
     for text in [
-        "[backend.own]\ndialect = \"gemini\"\nkey = \"sk-secret-1\"\n",
+        "[backend.own]\nwire_format = \"gemini\"\nkey = \"sk-secret-1\"\n",
         "backend.own = { key = 'sk-secret,1', dialct = \"gemini\" }\n",
-        "[backend.own]\ndialect = \"gemini\"\n\"key\" = sk-secret-1\n",
+        "[backend.own]\nwire_format = \"gemini\"\n\"key\" = sk-secret-1\n",
     ] {
         std::fs::write(&file, text).unwrap();
         let fault = Models::load(Some(&file)).unwrap_err().to_string();

@@ -56,7 +56,7 @@ const EPISODE: Walk = Walk {
         ("trace info a.parquet", Answer),
         ("trace validate a.parquet", Answer),
         ("trace check a.parquet --max-unreadable 0.05", Answer),
-        ("trace validate wide.parquet", Limit("steps times columns of an episode")),
+        ("trace validate wide.parquet", Answer),
         ("trace seal a.parquet sealed.parquet", Answer),
         ("trace seal wide.parquet sealed.parquet", Limit("steps times columns of an episode")),
         ("score a.parquet -o scores.csv", Answer),

@@ -231,7 +231,7 @@ impl QualityReader {
     }
 
     pub fn read(&self, batch: &EpisodeBatch, kept: Option<&BooleanArray>) -> QualityByCell {
-        let mut cells = Cells::default();
+        let mut cells = ReplyCells::default();
         let columns = ReplyColumns::of(batch);
         let keys = ["experiment", "model", CONDITION].map(|name| batch.episodes.column_by_name(name));
         let ids = if columns.texts[0].is_some() { episode_ids(batch) } else { Vec::new() };
@@ -254,7 +254,7 @@ impl QualityReader {
 
 /// Quality by cell while a batch is read; texts are indices of distinct values.
 #[derive(Default)]
-struct Cells {
+struct ReplyCells {
     known: HashMap<[Option<usize>; 3], usize>,
     cells: Vec<(CellKey, Counts)>,
 }
@@ -265,7 +265,7 @@ struct Counts {
     rest: Quality,
 }
 
-impl Cells {
+impl ReplyCells {
     fn at(&mut self, keys: [Option<&ArrayRef>; 3], episode: usize) -> &mut Counts {
         let codes = keys.map(|column| column?.as_dictionary_opt::<Int32Type>()?.key(episode));
         let at = *self.known.entry(codes).or_insert_with(|| {

@@ -64,7 +64,7 @@ pub fn departures(plan: &RegisteredPlan, table: &EpisodeTable, options: &Options
             differ(what, &listed(registered), &listed(names));
         }
     }
-    let blocks = Blocks::of(table);
+    let blocks = PlannedBlocks::of(table);
     differ("seeds of a model in an experiment", &request.clusters.seeds, &blocks.each(|block| block.seeds.len()));
     if let Some(planned) = plan.plan.tests.first() {
         if let Some(episodes) = planned.episodes {
@@ -121,9 +121,9 @@ struct PlannedBlock {
     episodes: usize,
 }
 
-struct Blocks<'a>(BTreeMap<(&'a str, &'a str), PlannedBlock>);
+struct PlannedBlocks<'a>(BTreeMap<(&'a str, &'a str), PlannedBlock>);
 
-impl<'a> Blocks<'a> {
+impl<'a> PlannedBlocks<'a> {
     fn of(table: &'a EpisodeTable) -> Self {
         let scenes = table.label("scene");
         let mut blocks: BTreeMap<(&str, &str), PlannedBlock> = BTreeMap::new();

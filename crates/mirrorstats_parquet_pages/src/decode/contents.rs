@@ -65,7 +65,7 @@ impl Texts {
 }
 
 /// The problem of a page: expected and found.
-type Fault = (&'static str, String);
+type ContentFault = (&'static str, String);
 
 impl Contents {
     pub(crate) fn new(column: &ColumnDescriptor, writes_out: bool) -> Self {
@@ -81,12 +81,12 @@ impl Contents {
     }
 
     /// Returns the number of bytes of written-out texts that the page adds.
-    pub(crate) fn check(&mut self, page: &Page) -> Result<u64, Fault> {
+    pub(crate) fn check(&mut self, page: &Page) -> Result<u64, ContentFault> {
         self.check_page(page)?;
         Ok(self.texts.take())
     }
 
-    fn check_page(&mut self, page: &Page) -> Result<(), Fault> {
+    fn check_page(&mut self, page: &Page) -> Result<(), ContentFault> {
         match page {
             Page::DictionaryPage { buf, num_values, .. } => {
                 let count = *num_values as usize;
@@ -136,7 +136,7 @@ impl Contents {
         stored: Option<Bytes>,
         values: &Bytes,
         encoding: Encoding,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), ContentFault> {
         let count = match stored {
             Some(stored) => {
                 ones(stored, rows).map_err(|Unsupported| levels("runs of another length, or levels above 1"))?
@@ -177,7 +177,7 @@ impl Contents {
         }
     }
 
-    fn dictionary(&mut self, values: &Bytes, count: usize) -> Result<(), Fault> {
+    fn dictionary(&mut self, values: &Bytes, count: usize) -> Result<(), ContentFault> {
         let fault = |found: &str| ("keys within the dictionary, one for each value", found.to_owned());
         let keys = self.keys.ok_or_else(|| fault("no dictionary"))?;
         if values.is_empty() && count == 0 {
@@ -202,7 +202,7 @@ impl Contents {
         if within { Ok(()) } else { Err(fault("a key beyond it")) }
     }
 
-    fn plain(&self, values: &[u8], count: usize) -> Result<(), Fault> {
+    fn plain(&self, values: &[u8], count: usize) -> Result<(), ContentFault> {
         if count == 0 && values.iter().any(|byte| *byte != 0) {
             return Err(("as many values as its levels say", "some, not 0".to_owned()));
         }
@@ -217,7 +217,7 @@ impl Contents {
     }
 }
 
-fn no_levels(stored: Bytes, rows: usize) -> Result<(), Fault> {
+fn no_levels(stored: Bytes, rows: usize) -> Result<(), ContentFault> {
     if stored.is_empty() {
         return Ok(());
     }
@@ -246,7 +246,7 @@ fn each_span(hybrid: &mut Hybrid, mut count: usize, mut take: impl FnMut(Span<'_
     Ok(())
 }
 
-fn other_bytes(values: &[u8], count: usize, width: usize) -> Fault {
+fn other_bytes(values: &[u8], count: usize, width: usize) -> ContentFault {
     ("as many bytes as its values take", format!("{} for {count} of {width}", values.len()))
 }
 
@@ -258,7 +258,7 @@ fn texts(mut values: &[u8], count: usize) -> Result<(), Unsupported> {
     Ok(())
 }
 
-fn delta(values: &[u8], count: usize) -> Result<(), Fault> {
+fn delta(values: &[u8], count: usize) -> Result<(), ContentFault> {
     if values.is_empty() && count == 0 {
         return Ok(());
     }
@@ -270,6 +270,6 @@ fn delta(values: &[u8], count: usize) -> Result<(), Fault> {
     if declared == count as u64 { Ok(()) } else { Err(fault()) }
 }
 
-fn levels(found: &str) -> Fault {
+fn levels(found: &str) -> ContentFault {
     ("a definition level of 0 or 1 for each row, and no other level", found.to_owned())
 }

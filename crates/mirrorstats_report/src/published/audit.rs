@@ -85,7 +85,7 @@ pub fn audit(
             cells += 1;
             let metric = known(table, name, cell, catalog)?;
             let Some(mean) = cell.mean else { continue };
-            let question = Question { mean, se: cell.se, metric, n, roundings };
+            let question = CellQuestion { mean, se: cell.se, metric, n, roundings };
             let Some((field, nearest)) = question.fault(&tried)? else { continue };
             let published = cell.se.map_or_else(|| mean.to_string(), |se| format!("{mean} ± {se}"));
             infeasible.push(InfeasibleCell { table: table.clone(), cell: name.clone(), published, field, nearest });
@@ -115,7 +115,7 @@ fn known<'c>(
     })
 }
 
-struct Question<'q> {
+struct CellQuestion<'q> {
     mean: Decimal,
     se: Option<Decimal>,
     metric: &'q Metric,
@@ -123,7 +123,7 @@ struct Question<'q> {
     roundings: &'q [Rounding],
 }
 
-impl Question<'_> {
+impl CellQuestion<'_> {
     /// The infeasible field of the cell, and the nearest feasible means.
     fn fault(&self, tried: &Budget) -> Result<Option<(Field, Vec<String>)>, Exceeded> {
         let (mut below, mut above, mut has_mean) = (BTreeSet::new(), BTreeSet::new(), false);

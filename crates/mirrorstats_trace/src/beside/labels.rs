@@ -94,39 +94,48 @@ pub struct Mark<'l> {
     pub note: Option<&'l str>,
 }
 
-/// The labels beside some traces. A million lines take about 80 MB.
+/// The labels beside some traces. A million lines take about 20 MB.
 #[derive(Clone, Debug, Default)]
 pub struct Labels {
     episodes: IndexSet<String>,
     coders: IndexSet<String>,
     words: IndexSet<String>,
-    /// The notes, by the last line of each key.
-    marks: BTreeMap<Key, Option<Box<str>>>,
+    /// Sorted, each once.
+    marks: Vec<Key>,
+    /// The notes of the last lines: few marks have one, so that a place for each would double the memory.
+    notes: BTreeMap<Key, Box<str>>,
 }
 
 /// The positions of names in their sets. The step is 0 for the whole episode; the word is [`NONE`] without a label.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Key {
-    episode: usize,
+    episode: u32,
     step: u32,
-    word: usize,
-    coder: usize,
+    word: u32,
+    coder: u32,
 }
 
-const NONE: usize = usize::MAX;
+const NONE: u32 = u32::MAX;
+
+/// The position of a name in its set. A list has far fewer names than 32 bits count.
+fn position(set: &mut IndexSet<String>, name: String) -> u32 {
+    u32::try_from(set.insert_full(name).0).unwrap_or(NONE)
+}
 
 impl Labels {
     /// The labels in the lists beside some traces; empty without lists.
     pub fn beside(traces: &[Input]) -> Result<Self, LabelsError> {
         let mut labels = Self::default();
         let lists: BTreeSet<PathBuf> = traces.iter().map(|input| list_beside(&input.path)).collect();
+        let mut marks = BTreeSet::new();
         for list in lists {
-            labels.read(&list)?;
+            labels.read(&list, &mut marks)?;
         }
+        labels.marks = marks.into_iter().collect();
         Ok(labels)
     }
 
-    fn read(&mut self, list: &Path) -> Result<(), LabelsError> {
+    fn read(&mut self, list: &Path, marks: &mut BTreeSet<Key>) -> Result<(), LabelsError> {
         let failed = |source| LabelsError::Read { path: list.to_owned(), source };
         let exceeded = |source| LabelsError::Budget { path: list.to_owned(), source };
         let notes = Budget::new(MOST_NOTES);
@@ -144,24 +153,26 @@ impl Labels {
             })?;
             line.check().map_err(|invalid| wrong(invalid.to_string()))?;
             notes.spend(line.note.as_ref().map_or(0, |note| note.len() as u64)).map_err(exceeded)?;
-            self.add(line);
+            self.add(line, marks);
             MOST_CODERS.check(self.coders.len() as u64).map_err(exceeded)?;
             MOST_WORDS.check(self.words.len() as u64).map_err(exceeded)?;
         }
         Ok(())
     }
 
-    fn add(&mut self, line: LabelLine) {
+    fn add(&mut self, line: LabelLine, marks: &mut BTreeSet<Key>) {
         let key = Key {
-            episode: self.episodes.insert_full(line.episode_id).0,
+            episode: position(&mut self.episodes, line.episode_id),
             step: line.step.unwrap_or(0),
-            word: line.label.map_or(NONE, |word| self.words.insert_full(word).0),
-            coder: self.coders.insert_full(line.coder).0,
+            word: line.label.map_or(NONE, |word| position(&mut self.words, word)),
+            coder: position(&mut self.coders, line.coder),
         };
+        self.notes.remove(&key);
         if line.removed {
-            self.marks.remove(&key);
+            marks.remove(&key);
         } else {
-            self.marks.insert(key, line.note.filter(|note| !note.is_empty()).map(Into::into));
+            marks.insert(key);
+            self.notes.extend(line.note.filter(|note| !note.is_empty()).map(|note| (key, note.into())));
         }
     }
 
@@ -171,7 +182,7 @@ impl Labels {
 
     /// The labels in use, in alphabetical order.
     pub fn words(&self) -> BTreeSet<&str> {
-        self.marks.keys().filter_map(|key| self.words.get_index(key.word)).map(String::as_str).collect()
+        self.marks.iter().filter_map(|key| self.words.get_index(key.word as usize)).map(String::as_str).collect()
     }
 
     pub fn columns(&self) -> Vec<String> {
@@ -180,16 +191,20 @@ impl Labels {
 
     pub fn episodes(&self) -> impl Iterator<Item = &str> {
         let mut last = None;
-        let numbers = self.marks.keys().map(|key| key.episode);
-        numbers.filter(move |number| last.replace(*number) != Some(*number)).map(|number| &*self.episodes[number])
+        let numbers = self.marks.iter().map(|key| key.episode);
+        numbers
+            .filter(move |number| last.replace(*number) != Some(*number))
+            .map(|number| &*self.episodes[number as usize])
     }
 
     /// The marks of an episode: its own, then those of its steps.
     pub fn of_episode(&self, id: &str) -> impl Iterator<Item = Mark<'_>> {
-        let start = |episode| Key { episode, step: 0, word: 0, coder: 0 };
-        let known = self.episodes.get_index_of(id);
-        let marks = known.map(|episode| self.marks.range(start(episode)..start(episode + 1)));
-        marks.into_iter().flatten().map(|(key, note)| self.mark(*key, note.as_deref()))
+        let known = self.episodes.get_index_of(id).and_then(|at| u32::try_from(at).ok());
+        let marks = known.map(|episode| {
+            let start = self.marks.partition_point(|key| key.episode < episode);
+            self.marks[start..].iter().take_while(move |key| key.episode == episode)
+        });
+        marks.into_iter().flatten().map(|key| self.mark(*key))
     }
 
     /// The value of a column: true if a coder gave the label to the episode or a step, false if coders gave only
@@ -204,16 +219,18 @@ impl Labels {
     /// The labels of each coder by episode; an empty set if the coder gave none.
     pub fn by_coder(&self) -> BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> {
         let mut coders: BTreeMap<&str, BTreeMap<&str, BTreeSet<&str>>> = BTreeMap::new();
-        for (key, note) in &self.marks {
-            let Mark { coder, label, .. } = self.mark(*key, note.as_deref());
-            coders.entry(coder).or_default().entry(&self.episodes[key.episode]).or_default().extend(label);
+        for key in &self.marks {
+            let Mark { coder, label, .. } = self.mark(*key);
+            coders.entry(coder).or_default().entry(&self.episodes[key.episode as usize]).or_default().extend(label);
         }
         coders
     }
 
-    fn mark<'l>(&'l self, Key { step, word, coder, .. }: Key, note: Option<&'l str>) -> Mark<'l> {
-        let label = self.words.get_index(word).map(String::as_str);
-        Mark { coder: &self.coders[coder], step: (step > 0).then_some(step), label, note }
+    fn mark(&self, key: Key) -> Mark<'_> {
+        let Key { step, word, coder, .. } = key;
+        let label = self.words.get_index(word as usize).map(String::as_str);
+        let note = self.notes.get(&key).map(AsRef::as_ref);
+        Mark { coder: &self.coders[coder as usize], step: (step > 0).then_some(step), label, note }
     }
 }
 

@@ -17,7 +17,7 @@ pub(crate) const UNITS_PER_PX: f64 = 100.0;
 /// More room than any figure needs; plotters clamps everything outside.
 const ROOM: u32 = 10_000_000;
 
-type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+type DrawResult = Result<(), DrawingErrorKind<Infallible>>;
 
 #[derive(Debug, Default)]
 pub(crate) struct Ink {
@@ -88,48 +88,64 @@ impl DrawingBackend for Ink {
         (ROOM, ROOM)
     }
 
-    fn ensure_prepared(&mut self) -> Drawn {
+    fn ensure_prepared(&mut self) -> DrawResult {
         Ok(())
     }
 
-    fn present(&mut self) -> Drawn {
+    fn present(&mut self) -> DrawResult {
         Ok(())
     }
 
-    fn draw_pixel(&mut self, (x, y): BackendCoord, color: BackendColor) -> Drawn {
+    fn draw_pixel(&mut self, (x, y): BackendCoord, color: BackendColor) -> DrawResult {
         let element = format!("rect x=\"{}\" y=\"{}\" width=\"1\" height=\"1\"", px(x), px(y));
         self.element(&element, &paint("fill", color));
         Ok(())
     }
 
-    fn draw_rect<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S, filled: bool) -> Drawn {
+    fn draw_rect<S: BackendStyle>(
+        &mut self,
+        from: BackendCoord,
+        to: BackendCoord,
+        style: &S,
+        filled: bool,
+    ) -> DrawResult {
         let (width, height) = (px(to.0 - from.0), px(to.1 - from.1));
         let element = format!("rect x=\"{}\" y=\"{}\" width=\"{width}\" height=\"{height}\"", px(from.0), px(from.1));
         self.element(&element, &either(style, filled));
         Ok(())
     }
 
-    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, points: I, style: &S) -> Drawn {
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, points: I, style: &S) -> DrawResult {
         let element = format!("path d=\"{}\"", path(points));
         self.element(&element, &stroke(style));
         Ok(())
     }
 
-    fn draw_circle<S: BackendStyle>(&mut self, (x, y): BackendCoord, radius: u32, style: &S, filled: bool) -> Drawn {
+    fn draw_circle<S: BackendStyle>(
+        &mut self,
+        (x, y): BackendCoord,
+        radius: u32,
+        style: &S,
+        filled: bool,
+    ) -> DrawResult {
         let radius = f64::from(radius) / UNITS_PER_PX;
         let element = format!("circle cx=\"{}\" cy=\"{}\" r=\"{radius}\"", px(x), px(y));
         self.element(&element, &either(style, filled));
         Ok(())
     }
 
-    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, corners: I, style: &S) -> Drawn {
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        corners: I,
+        style: &S,
+    ) -> DrawResult {
         let element = format!("path d=\"{}Z\"", path(corners));
         self.element(&element, &paint("fill", style.color()));
         Ok(())
     }
 
     /// `pos` is the start, middle or end of the text's baseline, depending on the anchor of `style`.
-    fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, (x, y): BackendCoord) -> Drawn {
+    fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, (x, y): BackendCoord) -> DrawResult {
         let (x, y) = (px(x), px(y));
         let anchor = match style.anchor().h_pos {
             HPos::Left => "",

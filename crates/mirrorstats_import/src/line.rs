@@ -4,9 +4,11 @@
 
 use std::collections::HashSet;
 use std::fmt;
+use std::marker::PhantomData;
 
 use serde::Deserialize;
-use serde::de::{Deserializer, IgnoredAny, MapAccess, Visitor};
+use serde::de::DeserializeOwned;
+use serde::de::{Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::Value;
 
 use super::cell;
@@ -30,35 +32,37 @@ pub(super) struct Line {
 }
 
 /// The keys and values of an object in their order, repeated ones included.
-pub(super) struct Pairs(Vec<(String, Value)>);
+pub(super) struct Pairs<V = Value>(Vec<(String, V)>);
 
-impl Pairs {
+impl<V> Pairs<V> {
     pub(super) fn repeated(&self) -> Option<&str> {
         let mut seen = HashSet::with_capacity(self.0.len());
         self.0.iter().map(|(key, _)| key.as_str()).find(|key| !seen.insert(*key))
     }
+}
 
+impl Pairs {
     pub(super) fn row(&self) -> Vec<(&str, &Value)> {
         self.0.iter().map(|(key, value)| (key.as_str(), value)).collect()
     }
 }
 
-impl<'de> Deserialize<'de> for Pairs {
+impl<'de, V: Deserialize<'de>> Deserialize<'de> for Pairs<V> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(PairsVisitor)
+        deserializer.deserialize_map(PairsVisitor(PhantomData))
     }
 }
 
-struct PairsVisitor;
+struct PairsVisitor<V>(PhantomData<V>);
 
-impl<'de> Visitor<'de> for PairsVisitor {
-    type Value = Pairs;
+impl<'de, V: Deserialize<'de>> Visitor<'de> for PairsVisitor<V> {
+    type Value = Pairs<V>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an object, one step")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Pairs, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
         let mut pairs = Vec::new();
         while let Some(pair) = map.next_entry()? {
             pairs.push(pair);
@@ -67,15 +71,68 @@ impl<'de> Visitor<'de> for PairsVisitor {
     }
 }
 
+/// A value without what lists and objects hold. The parser steps over any depth of them, but reads only 128 levels.
+struct Plain(Value);
+
+impl<'de> Deserialize<'de> for Plain {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(PlainVisitor)
+    }
+}
+
+struct PlainVisitor;
+
+impl<'de> Visitor<'de> for PlainVisitor {
+    type Value = Plain;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Plain, E> {
+        Ok(Plain(Value::Null))
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Plain, E> {
+        Ok(Plain(value.into()))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Plain, E> {
+        Ok(Plain(value.into()))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Plain, E> {
+        Ok(Plain(value.into()))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Plain, E> {
+        Ok(Plain(value.into()))
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Plain, E> {
+        Ok(Plain(value.into()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Plain, A::Error> {
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(Plain(Value::Array(Vec::new())))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Plain, A::Error> {
+        while map.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
+        Ok(Plain(Value::Object(serde_json::Map::new())))
+    }
+}
+
 /// The keys and values of a line, each key once; `ended` says whether it had a line feed.
-pub(super) fn pairs(bytes: &[u8], ended: bool) -> Result<Pairs, Box<Fault>> {
+pub(super) fn pairs<V: DeserializeOwned>(bytes: &[u8], ended: bool) -> Result<Pairs<V>, Box<Fault>> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let found = format!("other bytes after the first {}", error.valid_up_to());
         Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
     })?;
     let text = text.trim_end();
     let marked = marked(text);
-    let pairs = serde_json::from_str::<Pairs>(&marked).map_err(|error| {
+    let pairs = serde_json::from_str::<Pairs<V>>(&marked).map_err(|error| {
         let is_object = marked.trim_start().starts_with('{');
         Box::new(match if is_object { Err(error) } else { other_value(&marked) } {
             Ok(found) => Fault::new("a JSON object, one step", found, "write one object a line"),
@@ -96,8 +153,8 @@ fn other_value(json: &str) -> serde_json::Result<String> {
 }
 
 pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
-    let Pairs(pairs) = pairs(bytes, ended)?;
-    Ok(pairs.into_iter().map(|(key, value)| (key, of_json(&value))).collect())
+    let Pairs(pairs) = pairs::<Plain>(bytes, ended)?;
+    Ok(pairs.into_iter().map(|(key, Plain(value))| (key, of_json(&value))).collect())
 }
 
 fn of_text(text: &str) -> LineValue {

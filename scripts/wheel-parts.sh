@@ -16,7 +16,7 @@ mkdir -p "$data/mirrorstats"
 scripts/sbom.py "$data/mirrorstats/sbom.cdx.json"
 mkdir -p "$data/man/man1" "$data/bash-completion/completions" "$data/zsh/site-functions" "$data/fish/vendor_completions.d"
 [ $# -gt 0 ] || exit 0
-"$@" man "$data/man/man1" 2>/dev/null
-"$@" completions bash >"$data/bash-completion/completions/mirrorstats"
-"$@" completions zsh >"$data/zsh/site-functions/_mirrorstats"
-"$@" completions fish >"$data/fish/vendor_completions.d/mirrorstats.fish"
+"$@" setup man "$data/man/man1" 2>/dev/null
+"$@" setup completions bash >"$data/bash-completion/completions/mirrorstats"
+"$@" setup completions zsh >"$data/zsh/site-functions/_mirrorstats"
+"$@" setup completions fish >"$data/fish/vendor_completions.d/mirrorstats.fish"

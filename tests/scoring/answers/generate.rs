@@ -354,7 +354,7 @@ impl Generator {
         let (sql, columns) = match self.draw.below(10) {
             0..=2 => self.rows(&from.text),
             3..=5 => self.groups(&from.text),
-            6 => self.two_keys(&from.text),
+            6 => self.sets(&from.text),
             7 => self.windows(&from.text),
             8 => self.union(&from.text),
             _ => {
@@ -405,10 +405,16 @@ impl Generator {
         }
     }
 
-    fn two_keys(&mut self, from: &str) -> (String, usize) {
+    fn sets(&mut self, from: &str) -> (String, usize) {
         let [a, b] = [0, 1].map(|_| self.columns[self.draw.below(self.columns.len())].0.clone());
+        let by = match self.draw.below(4) {
+            0 => format!("ROLLUP ({a}, {b})"),
+            1 => format!("CUBE ({a}, {b})"),
+            2 => format!("GROUPING SETS (({a}), ({b}), ())"),
+            _ => format!("{a}, {b}"),
+        };
         let value = self.aggregate(1);
-        (format!("SELECT {a} AS k0, {b} AS k1, {value} AS v, count(*) AS n FROM {from} GROUP BY {a}, {b}"), 4)
+        (format!("SELECT {a} AS k0, {b} AS k1, {value} AS v, count(*) AS n FROM {from} GROUP BY {by}"), 4)
     }
 
     fn windows(&mut self, from: &str) -> (String, usize) {

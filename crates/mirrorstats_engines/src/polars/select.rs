@@ -1,20 +1,25 @@
 //! One SELECT: WHERE, groups, HAVING, windows, columns, DISTINCT, ORDER BY.
 
+use std::collections::HashSet;
 use std::ops::ControlFlow;
 
-use polars::prelude::{Expr, LazyFrame, UniqueKeepStrategy, col, len};
+use polars::prelude::{Expr, LazyFrame, NULL, UnionArgs, UniqueKeepStrategy, col, concat, len, lit};
 use sqlparser::ast::{
-    Distinct, ExcludeSelectItem, Expr as Ast, GroupByExpr, ObjectName, OrderByExpr, Query, Select, SelectItem,
-    SelectItemQualifiedWildcardKind, Spanned as _, Visit, Visitor, WildcardAdditionalOptions,
+    Distinct, ExcludeSelectItem, Expr as Ast, GroupByExpr, GroupByWithModifier, ObjectName, OrderByExpr, Query, Select,
+    SelectItem, SelectItemQualifiedWildcardKind, Spanned as _, Visit, Visitor, WildcardAdditionalOptions,
 };
 
+use super::accepted::Kind;
 use super::names::column_name;
 use super::plan::{Planner, sort};
-use super::refused::{QueryResult, unsupported};
+use super::refused::QueryResult;
 use super::relation::{Column, Found, Relation, find};
+use super::run::PolarsError;
 use super::scope::{Key, Scope};
 use super::value::Value;
 use super::windows::{Order, integer, is_aggregate_call};
+
+const MOST_SETS: usize = 64;
 
 /// A column of the result.
 struct Item {
@@ -33,7 +38,7 @@ impl Planner<'_> {
         if let Some(condition) = &select.selection {
             frame = frame.filter(scope.rows("WHERE", |scope| scope.truth(condition))?);
         }
-        let is_grouped = scope.groups(select, orders)?;
+        let sets = scope.groups(select, orders)?;
         let items = scope.items(&select.projection)?;
         let before = scope.windows.len();
         let having = select.having.as_ref().map(|having| scope.truth(having)).transpose()?;
@@ -43,8 +48,8 @@ impl Planner<'_> {
         let (distinct, columns) = (select.distinct == Some(Distinct::Distinct), scope.columns_of(&items));
         let (extra, keys) = scope.orders(orders, &items, &columns, distinct)?;
         frame = frame.with_columns(&scope.prepared);
-        if is_grouped {
-            frame = grouped(frame, &scope);
+        if let Some(sets) = sets {
+            frame = grouped(&frame, &scope, &sets)?;
         }
         frame = having.into_iter().fold(frame, LazyFrame::filter);
         for window in &scope.windows {
@@ -118,31 +123,66 @@ fn has_aggregate(node: &impl Visit) -> bool {
 }
 
 impl Scope<'_, '_> {
-    /// Reads GROUP BY. Returns false if rows are not grouped.
-    fn groups(&mut self, select: &Select, orders: &[OrderByExpr]) -> QueryResult<bool> {
+    /// Reads GROUP BY. Returns the grouping sets as positions of keys; `None` if rows are not grouped.
+    fn groups(&mut self, select: &Select, orders: &[OrderByExpr]) -> QueryResult<Option<Vec<Vec<usize>>>> {
         let GroupByExpr::Expressions(parts, modifiers) = &select.group_by else {
-            return Err(unsupported(self.source(), select.span(), "GROUP BY ALL"));
+            return Err(super::refused::unsupported(self.source(), select.span(), "GROUP BY ALL"));
         };
-        if !modifiers.is_empty() {
-            return Err(unsupported(self.source(), select.span(), format!("`{}`", select.group_by)));
-        }
         let aggregates =
             has_aggregate(&select.projection) || has_aggregate(&orders.to_vec()) || select.having.is_some();
-        if parts.is_empty() && !aggregates {
-            return Ok(false);
+        if parts.is_empty() && modifiers.is_empty() && !aggregates {
+            return Ok(None);
         }
-        let mut asts: Vec<Ast> = Vec::new();
-        for part in parts {
-            let key = match integer(part) {
-                None => part.clone(),
-                Some(at) => self.position(part, at, &select.projection)?,
-            };
-            if !asts.contains(&key) {
-                asts.push(key);
+        let mut keys: Vec<Ast> = Vec::new();
+        let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
+        for option in self.options(parts, modifiers, select)? {
+            let option: Vec<Vec<usize>> = option.into_iter().map(|set| positions(&mut keys, set)).collect();
+            sets = sets.iter().flat_map(|set| option.iter().map(move |more| [set.as_slice(), more].concat())).collect();
+            if sets.len() > MOST_SETS {
+                let message = format!("expected at most {MOST_SETS} grouping sets, found {}", sets.len());
+                return self.wrong(select.span(), message, None);
             }
         }
-        self.keys = Some(asts.iter().map(|key| self.group_key(key)).collect::<Result<_, _>>()?);
-        Ok(true)
+        let is_set = sets.len() > 1;
+        let keys = keys.iter().map(|key| self.group_key(key, is_set)).collect::<Result<_, _>>()?;
+        self.keys = Some(keys);
+        Ok(Some(sets))
+    }
+
+    fn options(
+        &self,
+        parts: &[Ast],
+        modifiers: &[GroupByWithModifier],
+        select: &Select,
+    ) -> QueryResult<Vec<Vec<Vec<Ast>>>> {
+        let single = |parts: &[Ast]| parts.iter().map(|part| vec![part.clone()]).collect::<Vec<_>>();
+        match modifiers {
+            [] => {}
+            [GroupByWithModifier::Rollup] => return Ok(vec![prefixes(&single(parts))]),
+            [GroupByWithModifier::Cube] if parts.len() <= 6 => return Ok(vec![subsets(&single(parts))]),
+            _ => {
+                return Err(super::refused::unsupported(
+                    self.source(),
+                    select.span(),
+                    format!("`{}`", select.group_by),
+                ));
+            }
+        }
+        let one = |part: &Ast| match part {
+            Ast::Rollup(parts) => Ok(prefixes(parts)),
+            Ast::Cube(parts) if parts.len() <= 6 => Ok(subsets(parts)),
+            Ast::Cube(parts) => {
+                let message = format!("expected at most {MOST_SETS} grouping sets, found 2^{}", parts.len());
+                self.wrong(part.span(), message, None)
+            }
+            Ast::GroupingSets(sets) => Ok(sets.clone()),
+            Ast::Tuple(_) => self.unsupported(part),
+            part => match integer(part) {
+                None => Ok(vec![vec![part.clone()]]),
+                Some(at) => Ok(vec![vec![self.position(part, at, &select.projection)?]]),
+            },
+        };
+        parts.iter().map(one).collect()
     }
 
     /// The selected expression with a number, from 1.
@@ -154,10 +194,12 @@ impl Scope<'_, '_> {
         }
     }
 
-    fn group_key(&mut self, key: &Ast) -> QueryResult<Key> {
+    fn group_key(&mut self, key: &Ast, is_set: bool) -> QueryResult<Key> {
         let row = self.rows("GROUP BY", |scope| scope.exact(key))?;
+        // The nulls of other grouping sets have one type.
+        let expr = if is_set { row.to(row.kind) } else { row.expr.clone() };
         let name = self.planner.fresh();
-        self.prepared.push(row.expr.clone().alias(name.as_str()));
+        self.prepared.push(expr.alias(name.as_str()));
         // A key may be named by its alias or by its expression.
         let meant = match key {
             Ast::Identifier(name) if !matches!(find(&self.columns, None, &name.value), Found::One(_)) => self
@@ -186,7 +228,7 @@ impl Scope<'_, '_> {
                 SelectItem::QualifiedWildcard(SelectItemQualifiedWildcardKind::ObjectName(name), options) => {
                     items.extend(self.all(item, Some(name), options)?);
                 }
-                _ => return Err(unsupported(self.source(), item.span(), format!("`{item}`"))),
+                _ => return Err(super::refused::unsupported(self.source(), item.span(), format!("`{item}`"))),
             }
         }
         Ok(items)
@@ -212,7 +254,7 @@ impl Scope<'_, '_> {
     ) -> QueryResult<Vec<Item>> {
         let rest = WildcardAdditionalOptions { opt_exclude: None, ..options.clone() }.to_string();
         if !rest.is_empty() {
-            return Err(unsupported(self.source(), item.span(), format!("`{item}`")));
+            return Err(super::refused::unsupported(self.source(), item.span(), format!("`{item}`")));
         }
         if self.keys.is_some() {
             let message = "the column `*` is used beside an aggregate without GROUP BY";
@@ -313,9 +355,63 @@ fn bare(name: &ObjectName) -> String {
     name.0.last().and_then(|part| part.as_ident()).map(|ident| ident.value.clone()).unwrap_or_default()
 }
 
-fn grouped(frame: LazyFrame, scope: &Scope<'_, '_>) -> LazyFrame {
-    let keys: Vec<Expr> = scope.keys.iter().flatten().map(|key| key.grouped.expr.clone()).collect();
+fn positions(keys: &mut Vec<Ast>, set: Vec<Ast>) -> Vec<usize> {
+    let mut position = |key: Ast| {
+        keys.iter().position(|known| *known == key).unwrap_or_else(|| {
+            keys.push(key);
+            keys.len() - 1
+        })
+    };
+    set.into_iter().map(&mut position).collect()
+}
+
+fn prefixes(parts: &[Vec<Ast>]) -> Vec<Vec<Ast>> {
+    (0..=parts.len()).rev().map(|length| parts[..length].concat()).collect()
+}
+
+fn subsets(parts: &[Vec<Ast>]) -> Vec<Vec<Ast>> {
+    let chosen = |bits: usize| parts.iter().enumerate().filter(move |(at, _)| bits & (1 << at) == 0);
+    (0..1_usize << parts.len()).map(|bits| chosen(bits).flat_map(|(_, part)| part.clone()).collect()).collect()
+}
+
+/// The groups of each grouping set; keys outside the set are null.
+fn grouped(frame: &LazyFrame, scope: &Scope<'_, '_>, sets: &[Vec<usize>]) -> QueryResult<LazyFrame> {
+    let keys = scope.keys.as_deref().unwrap_or_default();
     // Polars needs an aggregate.
     let aggregates: Vec<Expr> = scope.aggregates.iter().cloned().chain([len().alias("")]).collect();
-    if keys.is_empty() { frame.select(aggregates) } else { frame.group_by(keys).agg(aggregates) }
+    let of_set = |set: &Vec<usize>| {
+        let set: HashSet<usize> = set.iter().copied().collect();
+        let by: Vec<Expr> = keys
+            .iter()
+            .enumerate()
+            .filter(|(at, _)| set.contains(at))
+            .map(|(_, key)| key.grouped.expr.clone())
+            .collect();
+        let nulls = keys.iter().enumerate().filter(|(at, _)| !set.contains(at)).map(|(_, key)| null_of(key));
+        let groups = if by.is_empty() {
+            frame.clone().select(&aggregates)
+        } else {
+            frame.clone().group_by(&by).agg(&aggregates)
+        };
+        let names = keys.iter().map(|key| key.grouped.expr.clone());
+        let parts = scope.aggregates.iter().map(|part| col(name_in(part)));
+        groups.with_columns(nulls.collect::<Vec<_>>()).select(names.chain(parts).chain([col("")]).collect::<Vec<_>>())
+    };
+    let frames: Vec<LazyFrame> = sets.iter().map(of_set).collect();
+    Ok(match frames.as_slice() {
+        [one] => one.clone(),
+        _ => concat(frames, UnionArgs::default()).map_err(PolarsError::from)?,
+    })
+}
+
+fn name_in(expr: &Expr) -> &str {
+    match expr {
+        Expr::Alias(_, name) | Expr::Column(name) => name.as_str(),
+        _ => "",
+    }
+}
+
+fn null_of(key: &Key) -> Expr {
+    let kind = if key.grouped.kind == Kind::Decimal { Kind::Float } else { key.grouped.kind };
+    lit(NULL).cast(kind.wide()).alias(name_in(&key.grouped.expr))
 }

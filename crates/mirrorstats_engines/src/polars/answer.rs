@@ -179,7 +179,9 @@ fn each<T: Send + 'static>(
 ) -> Result<T, PolarsError> {
     let shared = Arc::new(Mutex::new((Some(into), None)));
     let (inner, work) = (Arc::clone(&shared), Arc::new(work));
-    let receive = move |batch: DataFrame| {
+    let receive = move |mut batch: DataFrame| {
+        // After grouping sets, the columns of a batch may be divided at different rows, which no writer takes.
+        batch.align_chunks_par();
         let mut state = inner.lock().unwrap_or_else(PoisonError::into_inner);
         let (into, failed) = &mut *state;
         if let Some(into) = into.as_mut().filter(|_| failed.is_none()) {

@@ -7,7 +7,7 @@ use super::spec::{
 };
 use mirrorstats_exact::escape::visible;
 
-/// An experiment in words; `occlusion` describes what hides the mirror in its scenes.
+/// An experiment in words; `occlusion` says how much of the body the clutter hides.
 pub fn explained(experiment: &Experiment, occlusion: Option<String>) -> String {
     let mut text = format!("{}: {}\n", experiment.name(), visible(&experiment.title));
     let mut line = |name: &str, words: String| {

@@ -117,7 +117,7 @@ impl Columns {
         self.known.keys().map(String::as_str)
     }
 
-    /// Adds a column or replaces it; columns of the schema stay as they are.
+    /// Adds a column or replaces it. A column of the schema is not replaced.
     pub fn add(&mut self, name: impl Into<String>, column: KnownColumn) {
         let name = name.into();
         if !self.known.get(&name).is_some_and(KnownColumn::is_of_schema) {

@@ -67,8 +67,8 @@ pub struct Manifest {
     pub filter: Option<String>,
     /// The inputs, ordered by path, then hash.
     pub inputs: Vec<InputFile>,
-    /// What was written beside this manifest, ordered by path. Absent in the copy inside `report.html`, whose own hash
-    /// would have to be in it.
+    /// The files beside this manifest, ordered by path. The copy inside `report.html` has none, because it cannot
+    /// contain its own hash.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<Output>,
     /// The definitions that gave the values.

@@ -1,4 +1,4 @@
-//! What mirrors and windows show in the agent's view.
+//! The view through mirrors and windows, as part of the agent's picture.
 //!
 //! MuJoCo draws at most one mirror, in its current state. So the first picture has blank panes. The view through each
 //! pane is a separate picture from beyond it, and its pixels are copied where rays show the pane.
@@ -9,7 +9,7 @@ use crate::model::{BEYOND_CAMERA, Stage};
 use crate::scene::HungPane;
 use crate::visibility::{self, Shown};
 use crate::world::World;
-use mirrorstats_experiment::spec::PaneKind;
+use mirrorstats_experiment::spec::{Look, PaneKind};
 use mirrorstats_trace::episodes::frame::Frame;
 
 impl Camera {
@@ -34,6 +34,9 @@ impl Camera {
             let in_view = visibility::in_view(world, stage, [self.width, self.height], within);
             let seen = self.through(stage, &world.scene().panes[pane], Some(&in_view))?;
             overlay(frame, &seen, |at| is_seen(&labels.codes[at]));
+            if world.config().look == Look::Textured && world.scene().panes[pane].kind != PaneKind::Window {
+                tint(frame, |at| is_seen(&labels.codes[at]));
+            }
         }
         Ok(())
     }
@@ -54,6 +57,17 @@ fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
     let pixels = frame.rgb.chunks_exact_mut(3).zip(over.rgb.chunks_exact(3)).enumerate();
     for (_, (pixel, seen)) in pixels.filter(|(at, _)| is_asked(*at)) {
         pixel.copy_from_slice(seen);
+    }
+}
+
+/// The shares of red, green and blue that glass reflects, of 256.
+const GLASS: [u16; 3] = [242, 250, 246];
+
+fn tint(frame: &mut Frame, is_asked: impl Fn(usize) -> bool) {
+    for (_, pixel) in frame.rgb.chunks_exact_mut(3).enumerate().filter(|(at, _)| is_asked(*at)) {
+        for (level, share) in pixel.iter_mut().zip(GLASS) {
+            *level = u8::try_from(u16::from(*level) * share / 256).unwrap_or(u8::MAX);
+        }
     }
 }
 

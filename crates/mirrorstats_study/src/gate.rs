@@ -19,7 +19,7 @@ use mirrorstats_trace::read::open::TraceSet;
 /// The side of a flip.
 type OfSide = fn(&mut FlippedPair) -> &mut Played;
 
-/// The verdicts on a later study against an earlier one: improved, held, regressed, or why there is none. Errors: as
+/// Compares a later study with an earlier one. Each cell has a verdict, or the reason for none. Errors: as
 /// [`Study::score`] for either study; a metric that a side lacks, or without a better direction; a cell that mixes
 /// episodes recorded differently; sums of squares beyond 128 bits.
 pub fn gate(base: &Study, new: &Study, options: &GateOptions) -> Result<Gate, StudyError> {

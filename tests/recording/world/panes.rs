@@ -169,7 +169,7 @@ fn textures_do_not_change_visibility() {
         World::new(&config, scene).unwrap()
     });
     let mut eyes = [textured, plain].map(|experiment| Camera::new(&config.for_experiment(&experiment)).unwrap());
-    let mut differs = 0;
+    let (mut differs, mut light) = (0, [[0_u64; 3]; 2]);
     for heading in 0..12 {
         let pose = Pose { heading: Heading::new(heading), ..looks[0].pose() };
         for world in &mut looks {
@@ -179,8 +179,16 @@ fn textures_do_not_change_visibility() {
         let [one, other] = [0, 1].map(|at| eyes[at].frame(&looks[at]).unwrap());
         differs += usize::from(one != other);
         assert_eq!(one, eyes[0].frame(&looks[0]).unwrap(), "a picture comes again");
+        let codes = labels(&looks[0], one.width, one.height).codes;
+        for at in (0..codes.len()).filter(|at| Shown::of_code(codes[*at]).pane().is_some()) {
+            for (sums, frame) in light.iter_mut().zip([&one, &other]) {
+                sums.iter_mut().zip(&frame.rgb[3 * at..]).for_each(|(sum, level)| *sum += u64::from(*level));
+            }
+        }
     }
     assert_eq!(differs, 12);
+    let [[red, green, _], [plain_red, plain_green, _]] = light;
+    assert!(plain_red > 0 && red * plain_green < green * plain_red, "textured mirrors are slightly green: {light:?}");
 }
 
 #[test]

@@ -102,7 +102,7 @@ pub struct Labels {
     words: IndexSet<String>,
     /// Sorted, each once.
     marks: Vec<Key>,
-    /// The notes of the last lines: few marks have one, so that a place for each would double the memory.
+    /// The notes. Few marks have one, so a place for each would double the memory.
     notes: BTreeMap<Key, Box<str>>,
 }
 

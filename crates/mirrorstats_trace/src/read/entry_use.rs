@@ -1,4 +1,4 @@
-//! The use of the texts of a column: texts are keys into entries, of which some may be unused.
+//! Counts how many rows use each entry of a column of texts. Rows are keys into the entries, and some entries are unused.
 
 use arrow::array::{Array as _, AsArray as _, StringArray};
 use arrow::datatypes::{ArrowNativeType, Int32Type};

@@ -269,7 +269,7 @@ struct Joiner<'a, W, R> {
     work: &'a W,
     receive: R,
     open: Vec<Rows>,
-    /// The episodes of all files, of which there may be many small ones.
+    /// Counts the episodes of all files together: many small files have many episodes.
     budget: Budget,
     file: usize,
     /// True after a fault of the file; the rest of it is ignored.

@@ -108,12 +108,12 @@ pub(crate) fn scene(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewErr
     let id = required(query, "id")?;
     let others = list::siblings(snapshot, id);
     let ids = std::iter::once(id).chain(others.iter().filter_map(|other| other["id"].as_str()));
-    let mut entry = Vec::new();
+    let mut episodes = Vec::new();
     for id in ids.take(MOST_OF_A_SCENE) {
         let opened = snapshot.episode(id)?;
         let episode = &opened.episode;
         let marks = moments(episode).into_iter().map(|(t, moment)| json!({"t": t, "title": moment.title()}));
-        entry.push(json!({
+        episodes.push(json!({
             "id": id,
             "name": visible(id),
             "model": visible(&episode.model),
@@ -124,9 +124,11 @@ pub(crate) fn scene(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewErr
             "frames": snapshot.logs.moment(&opened, 1)?.is_some_and(|moment| moment.frame.is_some()) || snapshot.renders(&opened),
         }));
     }
-    entry.sort_by_key(|episode| episode["name"].to_string());
+    episodes.sort_by_key(|episode| episode["name"].to_string());
     let has_scene = snapshot.episode(id)?.episode.scene.is_some();
-    Ok(json!({"episodes": entry, "has_scene": has_scene, "others": (others.len() + 1).saturating_sub(MOST_OF_A_SCENE)}))
+    Ok(
+        json!({"episodes": episodes, "has_scene": has_scene, "others": (others.len() + 1).saturating_sub(MOST_OF_A_SCENE)}),
+    )
 }
 
 /// Returns true if both have the same frame at a step; null if either has no frame.

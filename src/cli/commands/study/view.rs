@@ -93,6 +93,13 @@ impl ViewArgs {
     }
 
     fn export_episode(view: &View, id: &str, path: &Path) -> Result<Outcome, Failure> {
+        if path.extension().is_some_and(|ending| ending == "png" || ending == "apng") {
+            return Err(Failure::input(format!(
+                "--export: an episode is written as a page, found the picture `{}`\n  help: name a file that ends in \
+                 .html; `mirrorstats world filmstrip` draws frames",
+                path.display()
+            )));
+        }
         output::write_file(path, export::episode_page(view, id)?.as_bytes())?;
         output::say(&format!("open {}", path.display()));
         Ok(Outcome::Done)

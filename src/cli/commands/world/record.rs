@@ -298,8 +298,7 @@ impl RecordArgs {
         let limits = (self.settings(&player).in_flight.get(), self.vlm.requests_per_minute);
         let requests = match &player {
             AnyPlayer::Model(model) if self.vlm.sends() => {
-                let episodes = (episodes.found(), episodes.todo.as_slice());
-                Some(RequestForecast::of(model, &subject, (&episodes.0, episodes.1), config, limits))
+                Some(RequestForecast::of(model, &subject, (&episodes.found(), &episodes.todo), config, limits))
             }
             _ => None,
         };

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::slice;
 
+use crate::caveats::{design_of, selection};
 use crate::copies::copies;
 use crate::inputs::Source;
-use crate::statistics::{check_verdicts, design_of, selection};
+use crate::statistics::check_verdicts;
 use crate::{Study, StudyError, pooled};
 use mirrorstats_analysis::gate::{FlippedPair, Gate, GateOptions, Played};
 use mirrorstats_metric::catalogs::catalog::{Better, Metric};

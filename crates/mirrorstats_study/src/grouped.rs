@@ -1,7 +1,7 @@
 //! The counted episodes of a study and their cells, from which answers are made.
 
+use crate::caveats::{design_of, pooled_cells, selection, undecided};
 use crate::losses::{Counted, beside_cells};
-use crate::statistics::{design_of, pooled_cells, selection, undecided};
 use crate::{Study, StudyError};
 use mirrorstats_analysis::statistics::Ranks;
 use mirrorstats_report::layout::{self, MetricTable};

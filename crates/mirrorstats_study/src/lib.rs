@@ -22,6 +22,7 @@
 
 pub mod agreement;
 pub mod audit;
+mod caveats;
 mod copies;
 pub mod diff;
 mod empty_filter;

@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use crate::caveats::{departed, selection};
 use crate::copies::copies;
 use crate::figure::{Drawings, FigureInputs};
 use crate::grouped::Grouped;
@@ -10,7 +11,7 @@ use crate::inputs::Source;
 use crate::losses::{Counted, LostAs, lost_episodes};
 use crate::question::DEFAULT_DEFINITIONS;
 use crate::results::{Outputs, Results};
-use crate::statistics::{departed, selection, statistics};
+use crate::statistics::statistics;
 use crate::{Study, StudyError, scores};
 use mirrorstats_analysis::plan::departures::Looks;
 use mirrorstats_analysis::statistics::{Options, Statistics};

@@ -243,7 +243,7 @@ impl QualityReader {
             counts.rest.episodes += 1;
             counts.rest.steps += (rows[1] - rows[0]) as u64;
             if !self.columns.is_empty() {
-                (rows[0]..rows[1]).for_each(|row| columns.add(row, counts));
+                columns.add(rows[0]..rows[1], counts);
                 let replies = columns.replies(rows[0]..rows[1]).filter(|count| count.replies > 0);
                 counts.rest.by_episode.extend(ids.get(episode).cloned().zip(replies));
             }
@@ -329,35 +329,46 @@ impl<'a> ReplyColumns<'a> {
         Some(count)
     }
 
-    fn add(&self, row: usize, Counts { texts, rest }: &mut Counts) {
+    fn add(&self, rows: Range<usize>, Counts { texts, rest }: &mut Counts) {
         for (column, counts) in self.texts.iter().zip(texts) {
-            let Some((column, code)) = column.as_ref().and_then(|column| Some((column, column.code(row)?))) else {
-                continue;
-            };
-            if counts.len() <= code {
-                counts.resize(column.texts.len(), 0);
-            }
-            counts[code] += 1;
+            let Some(column) = column else { continue };
+            counts.resize(counts.len().max(column.texts.len()), 0);
+            rows.clone().filter_map(|row| column.code(row)).for_each(|code| counts[code] += 1);
         }
         let [latency, prompt, completion, cost] = self.numbers;
-        if let Some(latency) = number::<Int64Type>(latency, row) {
-            *rest.latencies.entry(latency).or_default() += 1;
-        }
+        each::<Int64Type>(latency, rows.clone(), |latency| *rest.latencies.entry(latency).or_default() += 1);
         for (column, total) in [(prompt, &mut rest.prompt_tokens), (completion, &mut rest.completion_tokens)] {
-            if let Some(tokens) = number::<Int64Type>(column, row) {
-                total.add(tokens.into());
+            each::<Int64Type>(column, rows.clone(), |tokens| total.add(tokens.into()));
+        }
+        each::<Float64Type>(cost, rows, |cost| {
+            if cost.is_finite() {
+                rest.cost_nano_usd.add(rounded(cost * NANO));
             }
-        }
-        if let Some(cost) = number::<Float64Type>(cost, row).filter(|cost| cost.is_finite()) {
-            #[expect(clippy::cast_possible_truncation, reason = "a cost of a reply is far below 2^127 billionths")]
-            rest.cost_nano_usd.add((cost * NANO).round() as i128);
-        }
+        });
     }
 }
 
-fn number<T: ArrowPrimitiveType>(column: Option<&ArrayRef>, row: usize) -> Option<T::Native> {
-    let column = column?.as_primitive_opt::<T>()?;
-    column.is_valid(row).then(|| column.value(row))
+/// Passes the values of some rows, without nulls.
+fn each<T: ArrowPrimitiveType>(column: Option<&ArrayRef>, rows: Range<usize>, mut take: impl FnMut(T::Native)) {
+    let Some(column) = column.and_then(|column| column.as_primitive_opt::<T>()) else { return };
+    let values = column.values();
+    match column.nulls().filter(|nulls| nulls.null_count() > 0) {
+        None => values[rows].iter().for_each(|value| take(*value)),
+        Some(nulls) => rows.filter(|row| nulls.is_valid(*row)).for_each(|row| take(values[row])),
+    }
+}
+
+/// The nearest integer, halves away from zero. The function `round` and integers of 128 bits took half of the time.
+#[expect(clippy::cast_possible_truncation, reason = "a cost of a reply is far below 2^127 billionths")]
+fn rounded(value: f64) -> i128 {
+    const EXACT: f64 = (1_i64 << 52) as f64;
+    if value.abs() >= EXACT {
+        return value.round() as i128;
+    }
+    let whole = value as i64;
+    #[expect(clippy::cast_precision_loss, reason = "it is below 2^52")]
+    let rest = value - whole as f64;
+    i128::from(whole + i64::from(rest >= 0.5) - i64::from(rest <= -0.5))
 }
 
 /// A text column as indices of its distinct values.

@@ -1,9 +1,11 @@
 //! From traces to the episode table: the plan's columns, one scan, one sorted table.
 
+use std::collections::{BTreeSet, HashSet};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use arrow::array::RecordBatch;
+use arrow::array::{Int64Array, RecordBatch};
 use arrow::compute::filter_record_batch;
 
 use super::error::{EngineError, ScoreError};
@@ -76,6 +78,8 @@ pub struct Outputs<'a> {
     pub quality: Option<&'a QualityReader>,
     /// Columns whose values are taken unchanged, unless the first definitions read them.
     pub unchecked: &'a [&'a str],
+    /// True to look for episodes that may be copies of others.
+    pub alike: bool,
 }
 
 /// The results of one scan.
@@ -87,6 +91,9 @@ pub struct Scored {
     /// do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
     pub quality: Option<QualityByCell>,
+    /// The episodes of the first definitions that equal another one in all columns read, except for the id; empty
+    /// unless requested.
+    pub alike: BTreeSet<String>,
 }
 
 /// Scores all episodes of some traces. The table does not depend on the number of threads, the order of files or the
@@ -122,19 +129,30 @@ pub fn score_all(
         let condition = quality.constants().filter(|name| !projection.constants.contains(name));
         projection.constants.extend(condition);
     }
-    let headers = definitions.iter().map(|definitions| header(definitions, outputs.labels)).collect();
+    projection.prints = outputs.alike;
+    let mut headers: Vec<Header> = definitions.iter().map(|definitions| header(definitions, outputs.labels)).collect();
+    // The prints are sorted like a metric, and then taken out.
+    if let Some(first) = headers.first_mut().filter(|_| outputs.alike) {
+        first.metrics.push(String::new());
+    }
     let mut found = timelines.as_ref().map(|_| Vec::new());
     let mut quality = outputs.quality.map(|_| QualityByCell::default());
     let read = |batch: &EpisodeBatch| {
         let values = plan.evaluate(&view(batch))?;
-        let scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
+        let mut scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
+        if let Some((first, prints)) = scores.first_mut().zip(batch.prints.as_ref()) {
+            let kept = |episode: &usize| first.kept.as_ref().is_none_or(|kept| kept.value(*episode));
+            let prints = (0..prints.len()).filter(kept).map(|episode| prints[episode].cast_signed());
+            let prints = Int64Array::from_iter_values(prints);
+            first.metrics.push(Arc::new(prints));
+        }
         let kept = scores.first().and_then(|scores: &BatchScores| scores.kept.as_ref());
         let quality = outputs.quality.map(|reader| reader.read(batch, kept));
         let timelines = timelines.as_ref().map(|reader| reader.timelines(&values, batch));
         Ok((scores, (timelines, quality)))
     };
     let mut exceeded = None;
-    let tables = collect(traces, &projection, headers, threads, read, |(timelines, replies)| {
+    let mut tables = collect(traces, &projection, headers, threads, read, |(timelines, replies)| {
         found.iter_mut().zip(timelines).for_each(|(found, part)| found.extend(part));
         if let Some((quality, part)) = quality.as_mut().zip(replies).filter(|_| exceeded.is_none()) {
             quality.merge(part);
@@ -144,7 +162,21 @@ pub fn score_all(
     if let Some(exceeded) = exceeded {
         return Err(of_first(traces, exceeded.into()));
     }
-    Ok(Scored { tables, timelines: found.map(in_key_order), quality })
+    let alike = tables.first_mut().filter(|_| outputs.alike).map(alike).unwrap_or_default();
+    Ok(Scored { tables, timelines: found.map(in_key_order), quality, alike })
+}
+
+/// The episodes that share their print with another one. Takes the prints out of the table.
+fn alike(table: &mut EpisodeTable) -> BTreeSet<String> {
+    let prints: Vec<i64> = table.metrics.pop().map(|prints| prints.iter().flatten().collect()).unwrap_or_default();
+    let mut sorted = prints.clone();
+    sorted.sort_unstable();
+    let repeated: HashSet<i64> = sorted.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+    if repeated.is_empty() {
+        return BTreeSet::new();
+    }
+    let rows = table.keys.iter().zip(&prints).filter(|(_, print)| repeated.contains(print));
+    rows.map(|(key, _)| key.episode_id.to_owned()).collect()
 }
 
 /// Checks the work that the definitions ask for against the size of the files, before a row is read.

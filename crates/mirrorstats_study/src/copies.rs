@@ -1,10 +1,10 @@
 //! Copies of episodes in a study: every number counts them as independent episodes.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::HashSet;
 
+use crate::results::Results;
 use crate::{Study, StudyError};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::copies::copies as find;
 
 const NAMED: usize = 3;
@@ -16,9 +16,14 @@ pub(crate) struct Copies {
 }
 
 /// The episodes that are copies of others; `None` without copies, and for scores, which have no steps to compare.
-pub(crate) fn copies(study: &Study, table: &EpisodeTable) -> Result<Option<Copies>, StudyError> {
+pub(crate) fn copies(study: &Study, results: &Results) -> Result<Option<Copies>, StudyError> {
     let Ok(traces) = study.traces() else { return Ok(None) };
-    let found = find(traces, alike(table), study.threads)?;
+    let mut alike = results.alike.clone();
+    if !alike.is_empty() {
+        let counted: HashSet<&str> = results.episodes.keys.iter().map(|key| key.episode_id).collect();
+        alike.retain(|id| counted.contains(id.as_str()));
+    }
+    let found = find(traces, &alike, study.threads)?;
     let named: Vec<String> = found.iter().take(NAMED).map(|it| named(&it.episode, &it.of)).collect();
     let rest = found.len().saturating_sub(NAMED);
     let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
@@ -37,15 +42,4 @@ pub(crate) fn copies(study: &Study, table: &EpisodeTable) -> Result<Option<Copie
 
 fn named(episode: &str, of: &str) -> String {
     format!("`{}` of `{}`", visible(episode), visible(of))
-}
-
-/// The episodes that share their keys and scores with another one.
-fn alike(table: &EpisodeTable) -> BTreeSet<String> {
-    let mut groups: BTreeMap<_, Vec<usize>> = BTreeMap::new();
-    for (row, key) in table.keys.iter().enumerate() {
-        let scores: Vec<Option<i64>> = table.metrics.iter().map(|metric| metric.get(row)).collect();
-        groups.entry((key.experiment, key.model, key.seed, key.run, scores)).or_default().push(row);
-    }
-    let several = groups.into_values().filter(|rows| rows.len() > 1).flatten();
-    several.map(|row| table.keys.get(row).episode_id.to_owned()).collect()
 }

@@ -7,6 +7,7 @@ use std::slice;
 use crate::caveats::{design_of, selection};
 use crate::copies::copies;
 use crate::inputs::Source;
+use crate::results::{Outputs, Results};
 use crate::statistics::check_verdicts;
 use crate::{Study, StudyError, pooled};
 use mirrorstats_analysis::gate::{FlippedPair, Gate, GateOptions, Played};
@@ -24,16 +25,17 @@ type OfSide = fn(&mut FlippedPair) -> &mut Played;
 /// [`Study::score`] for either study; a metric that a side lacks, or without a better direction; a cell that mixes
 /// episodes recorded differently; sums of squares beyond 128 bits.
 pub fn gate(base: &Study, new: &Study, options: &GateOptions) -> Result<Gate, StudyError> {
-    let tables = [gated(base, options)?, gated(new, options)?];
+    let results = [gated(base, options)?, gated(new, options)?];
+    let tables = results.each_ref().map(|results| &results.episodes);
     let design = design_of(&tables[0].declared.clone().joined(tables[1].declared.clone()));
-    let mut gate = Gate::between([&tables[0], &tables[1]], design, options)?;
-    let sides = [("base", base, &tables[0]), ("new", new, &tables[1])];
-    gate.caveats.extend(selection(new, &tables[1]).map(|selection| selection.sentence()));
+    let mut gate = Gate::between(tables, design, options)?;
+    let sides = [("base", base, tables[0]), ("new", new, tables[1])];
+    gate.caveats.extend(selection(new, tables[1]).map(|selection| selection.sentence()));
     for (_, study, table) in sides.into_iter().filter(|_| options.pool) {
         gate.caveats.extend(pooled::mixtures(table, &study.question.by_over(table))?);
     }
-    for (side, study, table) in sides {
-        gate.caveats.extend(copies(study, table)?.map(|copies| format!("{side}: {}", copies.sentence)));
+    for ((side, study, _), results) in sides.into_iter().zip(&results) {
+        gate.caveats.extend(copies(study, results)?.map(|copies| format!("{side}: {}", copies.sentence)));
     }
     let of_side: [OfSide; 2] = [|flip| &mut flip.base, |flip| &mut flip.new];
     let mut caveats = Vec::new();
@@ -67,17 +69,18 @@ pub fn leading_metric(study: &Study) -> Result<String, StudyError> {
     found.map(|(name, _)| name.clone()).ok_or_else(|| StudyError::NoDirection { metric: first() })
 }
 
-fn gated(study: &Study, options: &GateOptions) -> Result<EpisodeTable, StudyError> {
-    let table = study.score()?.episodes;
+fn gated(study: &Study, options: &GateOptions) -> Result<Results, StudyError> {
+    let results = study.scan(Outputs { losses: true, alike: true, ..Outputs::default() })?;
+    let table = &results.episodes;
     study.check_filter(table.len())?;
-    check_verdicts(&table)?;
-    if check_metric(&table, &options.metric)?.better == Better::Neither {
+    check_verdicts(table)?;
+    if check_metric(table, &options.metric)?.better == Better::Neither {
         return Err(StudyError::NoDirection { metric: options.metric.clone() });
     }
     if !options.pool {
-        pooled::check(&table, &study.question.by_over(&table))?;
+        pooled::check(table, &study.question.by_over(table))?;
     }
-    Ok(table)
+    Ok(results)
 }
 
 /// The value of each episode, and the timesteps that decided it.

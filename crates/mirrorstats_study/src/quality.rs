@@ -117,8 +117,8 @@ pub fn quality(study: &Study) -> Result<QualityByCell, StudyError> {
     let nobody = all.clone().filtered("nobody", "false", &columns)?;
     let lost = lost_episodes(traces)?;
     let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
-    let wanted =
-        score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader), unchecked: &UNCHECKED };
+    let (quality, unchecked) = (Some(&reader), &UNCHECKED[..]);
+    let wanted = score_traces::Outputs { labels: &labels, quality, unchecked, ..score_traces::Outputs::default() };
     let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
     let Scored { tables, quality, .. } = score_traces::score_all(traces, &definitions, wanted, study.threads)?;
     let [episodes, ended]: [_; 2] = tables.try_into().expect("a table per definitions");

@@ -92,7 +92,7 @@ pub fn report(study: &Study, options: &ReportOptions) -> Result<Report, StudyErr
     // Small files first: a mistake in the style should not cost a scan of the traces.
     let style = Style::load(&options.style)?;
     let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
-    let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
+    let outputs = Outputs { losses: true, quality: true, hashes: true, alike: true, ..Outputs::of_figures(figures) };
     let grouped = study.grouped_with(outputs)?;
     let statistics = options.figures.then(|| statistics(&grouped, &Options::default())).transpose()?;
     let (tables, ranks) = grouped.tables(&style)?;
@@ -149,7 +149,7 @@ fn notes(study: &Study, results: &Results, lost: &LostCounts) -> Result<Vec<Stri
         };
         notes.push(format!("{}: {counted}; see tables/quality.md", lost_episodes(lost.total())));
     }
-    notes.extend(copies(study, episodes)?.map(|copies| copies.sentence));
+    notes.extend(copies(study, results)?.map(|copies| copies.sentence));
     let own = Options { selection: selection(study, episodes), ..Options::default() };
     let departures = departed(study, episodes, &own, Looks::Once).into_iter().flatten();
     notes.extend(departures.map(|departure| format!("departure from the registered plan: {departure}")));

@@ -25,6 +25,8 @@ pub struct Outputs {
     pub quality: bool,
     /// The hashes of the inputs.
     pub hashes: bool,
+    /// The episodes that may be copies of others.
+    pub alike: bool,
 }
 
 impl Outputs {
@@ -52,12 +54,14 @@ pub struct Results {
     pub quality: Option<QualityByCell>,
     /// The inputs with their hashes; empty if not requested.
     pub inputs: Vec<bundle::InputFile>,
+    /// The episodes that equal another one in all columns read, except for the id; empty if not requested.
+    pub(crate) alike: BTreeSet<String>,
 }
 
 impl Results {
     pub(crate) fn of(episodes: EpisodeTable) -> Self {
-        let (timelines, outcomes, lost, quality, inputs) = (None, None, None, None, Vec::new());
-        Self { episodes, timelines, outcomes, lost, quality, inputs }
+        let (timelines, outcomes, lost, quality) = (None, None, None, None);
+        Self { episodes, timelines, outcomes, lost, quality, inputs: Vec::new(), alike: BTreeSet::new() }
     }
 
     /// The same results, with a non-default condition in the model's name: `model [condition]`.

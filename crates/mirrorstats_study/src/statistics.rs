@@ -31,7 +31,7 @@ pub fn statistics(grouped: &Grouped<'_>, options: &Options) -> Result<Statistics
     };
     let departures = departed(study, episodes, &options, Looks::Once);
     let count = departures.as_ref().map_or(0, Vec::len);
-    let copies = copies(study, episodes)?;
+    let copies = copies(study, results)?;
     let as_failures = failures.map(|total| format!("{total} lost episodes counted as failures"));
     let departed = (count > 0).then(|| format!("departures from the registered plan: {count}"));
     let caveat = copies.as_ref().map(|copies| copies.phrase.clone());

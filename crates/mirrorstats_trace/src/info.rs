@@ -158,7 +158,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
     let summary = set.scan(
-        &Projection { unchecked: statuses, ..Projection::default() },
+        &Projection { unchecked: statuses, without_t: true, ..Projection::default() },
         threads,
         |batch| {
             let list = if listing == Listing::Episodes { list(set, &batch) } else { Vec::new() };

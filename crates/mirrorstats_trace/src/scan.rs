@@ -16,6 +16,7 @@ use arrow::error::ArrowError;
 use super::error::TraceError;
 use super::read::open::TraceSet;
 use super::read::parallel_scan::{Episodes, ScanEvent, pass};
+use super::read::prints;
 use super::read::projection::Layout;
 use super::schema::DeclaredColumn;
 use super::validate::color_set::{Spellings, other_names};
@@ -36,6 +37,10 @@ pub struct Projection {
     pub declared: Vec<DeclaredColumn>,
     /// The known experiments; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
+    /// True to compute [`EpisodeBatch::prints`].
+    pub prints: bool,
+    /// True to leave the timesteps unread and unchecked.
+    pub without_t: bool,
 }
 
 impl Projection {
@@ -63,6 +68,8 @@ pub struct EpisodeBatch {
     /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`], those of labels last.
     pub episodes: RecordBatch,
     pub origin: RowOrigin,
+    /// One number per episode, if asked for: equal for equal rows in the columns read, without the id.
+    pub prints: Option<Vec<u64>>,
 }
 
 /// A column of steps with few distinct texts, one byte per row.
@@ -113,6 +120,9 @@ impl TraceSet {
         let read = || EPISODE_COLUMNS.into_iter().chain(constants.iter().copied());
         let mut layout = Layout::new(self, projection.step_columns(), read())?;
         layout.with_declared(&projection.declared);
+        if projection.without_t {
+            layout.without_steps();
+        }
         for column in layout.columns.iter_mut().filter(|column| projection.unchecked.contains(&column.name)) {
             column.known = None;
         }
@@ -123,8 +133,9 @@ impl TraceSet {
             episodes: read().filter_map(|name| layout.position(name)).collect(),
         };
         let whole = |episodes: Episodes| -> Result<EpisodeBatch, TraceError> {
+            let prints = projection.prints.then(|| prints::of_episodes(&layout, &episodes));
             let batch = shape.batch(episodes)?;
-            Ok(EpisodeBatch { episodes: self.with_label_columns(batch.episodes, &labels)?, ..batch })
+            Ok(EpisodeBatch { episodes: self.with_label_columns(batch.episodes, &labels)?, prints, ..batch })
         };
         let mut prints = Prints::default();
         let mut spellings = Spellings::new(self.files());
@@ -214,7 +225,7 @@ impl Shape<'_> {
         let constants = self.part(&self.episodes, episodes.len(), |place| episodes.columns[place].at(firsts))?;
         let first = episodes.pieces[0];
         let origin = RowOrigin { file: episodes.file, row_group: first.row_group, row: first.row };
-        Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin })
+        Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin, prints: None })
     }
 
     fn part(

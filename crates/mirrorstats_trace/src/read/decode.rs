@@ -174,6 +174,7 @@ impl<'a> RowGroup<'a> {
             }
         }
         if count == 0 {
+            self.seen.iter_mut().flatten().for_each(Seen::finish);
             return self.check_statistics().map(|()| None);
         }
         for (seen, column) in self.seen.iter_mut().zip(&columns) {
@@ -341,7 +342,8 @@ pub(crate) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option
 }
 
 fn root(file: &TraceFile, layout: &Layout, at: usize) -> Option<usize> {
-    file.columns().iter().position(|column| column.name == layout.columns[at].name)
+    let LayoutColumn { name, left_out, .. } = &layout.columns[at];
+    file.columns().iter().position(|column| !left_out && column.name == *name)
 }
 
 fn form(layout: &Layout, at: usize) -> Form {

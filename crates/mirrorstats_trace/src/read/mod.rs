@@ -7,6 +7,7 @@ pub mod footer;
 pub mod in_order;
 pub mod open;
 pub(crate) mod parallel_scan;
+pub(crate) mod prints;
 pub(crate) mod projection;
 pub mod search;
 pub(crate) mod statistics;

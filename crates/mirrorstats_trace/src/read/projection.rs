@@ -26,6 +26,8 @@ pub(crate) struct LayoutColumn {
     pub(crate) values: Vec<String>,
     /// True if it holds only nulls in all files, of no type.
     is_null: bool,
+    /// True if all rows read as null.
+    pub(crate) left_out: bool,
 }
 
 impl Layout {
@@ -54,8 +56,22 @@ impl Layout {
         let kind = kind_in(set, name)?;
         let constant = constant || known.is_some_and(|column| column.constant);
         let is_null = set.column(name).is_some_and(|column| column.is_null);
-        self.columns.push(LayoutColumn { name: name.to_owned(), kind, known, constant, values: Vec::new(), is_null });
+        self.columns.push(LayoutColumn {
+            name: name.to_owned(),
+            kind,
+            known,
+            constant,
+            values: Vec::new(),
+            is_null,
+            left_out: false,
+        });
         Ok(())
+    }
+
+    /// Leaves the timesteps out, where only the episodes matter: of the keys, they alone differ in each row.
+    pub(crate) fn without_steps(&mut self) {
+        let t = &mut self.columns[T];
+        (t.known, t.left_out) = (None, true);
     }
 
     /// Adds the rules that definitions declare for columns outside the schema.

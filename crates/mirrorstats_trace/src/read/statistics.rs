@@ -6,13 +6,13 @@
 
 use std::cmp::Ordering;
 
-use arrow::array::{Array, ArrayRef, AsArray as _, UInt8Array};
+use arrow::array::{Array, ArrayRef, AsArray as _};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use parquet::basic::{ConvertedType, Encoding, LogicalType};
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 use parquet::file::statistics::Statistics;
 
-use super::entry_use::EntryUse;
+use super::entry_use::{EntryUse, count, lengths};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_parquet_pages::{Column, Runs};
 
@@ -96,19 +96,40 @@ pub(crate) struct Seen {
     greatest: Option<Bound>,
     /// The bounds of dictionary texts. Some writers use these for statistics, even if no row has them.
     entries: Option<[Vec<u8>; 2]>,
+    /// The texts of the rows since the entries changed: all rows of a row group may have the same.
+    texts: Option<EntryUse>,
 }
 
 impl Seen {
     pub(crate) fn add(&mut self, column: &Column) {
-        match (EntryUse::of_column(column), column) {
-            (Some(texts), _) => self.texts(&texts),
-            (None, Column::Flat(values)) => {
+        if self.texts.as_mut().is_some_and(|texts| texts.extend(column)) {
+            return;
+        }
+        self.finish();
+        self.texts = EntryUse::of_column(column);
+        match column {
+            _ if self.texts.is_some() => {}
+            Column::Flat(values) => {
                 self.nulls += values.null_count() as u64;
                 self.ends(values, 0..values.len());
             }
-            (None, Column::Runs(runs)) => self.runs(runs),
-            (None, Column::Keys(keys)) => self.keys(keys.keys(), keys.values()),
+            Column::Runs(runs) => self.runs(runs),
+            Column::Keys(keys) => {
+                let mut rows = vec![0; keys.values().len()];
+                count(keys.keys(), &mut rows, &mut self.nulls);
+                self.ends(keys.values(), (0..rows.len()).filter(|at| rows[*at] > 0));
+            }
         }
+    }
+
+    /// Takes up the texts, at the end of the rows.
+    pub(crate) fn finish(&mut self) {
+        let Some(texts) = self.texts.take() else { return };
+        self.nulls += texts.nulls;
+        self.bytes += texts.bytes();
+        let all = texts.entries().map(str::as_bytes).chain(self.entries.iter().flatten().map(Vec::as_slice));
+        self.entries = all.clone().min().zip(all.max()).map(|(least, greatest)| [least.to_vec(), greatest.to_vec()]);
+        self.both(texts.used().map(|(text, _)| text.as_bytes()), Ord::cmp, |text| Bound::Text(text.to_vec()));
     }
 
     pub(crate) fn fault(&self, declared: &Chunk) -> Option<(String, String)> {
@@ -147,45 +168,27 @@ impl Seen {
     }
 
     fn runs(&mut self, runs: &Runs) {
-        let starts: Vec<(usize, usize)> = runs.starts().collect();
-        let ends = starts.iter().skip(1).map(|(start, _)| *start).chain([runs.rows()]);
         let values = runs.values();
-        let nulls = starts.iter().zip(ends).filter(|((_, run), _)| values.is_null(*run));
-        self.nulls += nulls.map(|((start, _), end)| (end - start) as u64).sum::<u64>();
-        self.ends(values, starts.iter().map(|(_, run)| *run));
-    }
-
-    fn keys(&mut self, keys: &UInt8Array, values: &ArrayRef) {
-        self.nulls += keys.null_count() as u64;
-        let mut used = [false; 256];
-        keys.iter().flatten().for_each(|key| used[usize::from(key)] = true);
-        self.ends(values, (0..values.len()).filter(|at| used.get(*at) == Some(&true)));
-    }
-
-    fn texts(&mut self, EntryUse { entries, used, nulls }: &EntryUse<'_>) {
-        self.nulls += nulls;
-        let bytes = |at: usize| u64::from(entries.value_length(at).cast_unsigned());
-        self.bytes += used.iter().enumerate().filter_map(|(at, used)| Some(bytes(at) * (*used)?.1)).sum::<u64>();
-        let all = entries.iter().flatten().map(str::as_bytes).chain(self.entries.iter().flatten().map(Vec::as_slice));
-        self.entries = all.clone().min().zip(all.max()).map(|(least, greatest)| [least.to_vec(), greatest.to_vec()]);
-        let present = entries.iter().zip(used).filter_map(|(text, used)| text.filter(|_| used.is_some()));
-        self.both(present, Ord::cmp, |text| Bound::Text(text.as_bytes().to_vec()));
+        let nulls = lengths(runs).filter(|(_, run, _)| values.is_null(*run));
+        self.nulls += nulls.map(|(_, _, length)| length).sum::<u64>();
+        self.ends(values, runs.starts().map(|(_, run)| run));
     }
 
     fn ends(&mut self, values: &ArrayRef, rows: impl Iterator<Item = usize>) {
-        let rows = rows.filter(|row| values.is_valid(*row));
+        let nulls = values.nulls();
+        let rows = rows.filter(|row| nulls.is_none_or(|nulls| nulls.is_valid(*row)));
         match values.data_type() {
             DataType::Boolean => {
-                let values = values.as_boolean();
+                let values = values.as_boolean().values();
                 self.both(rows.map(|row| values.value(row)), Ord::cmp, Bound::Bool);
             }
             DataType::Int64 => {
-                let values = values.as_primitive::<Int64Type>();
-                self.both(rows.map(|row| values.value(row)), Ord::cmp, Bound::Int);
+                let values = values.as_primitive::<Int64Type>().values();
+                self.both(rows.map(|row| values[row]), Ord::cmp, Bound::Int);
             }
             DataType::Float64 => {
-                let values = values.as_primitive::<Float64Type>();
-                let numbers = rows.map(|row| values.value(row)).filter(|value| !value.is_nan());
+                let values = values.as_primitive::<Float64Type>().values();
+                let numbers = rows.map(|row| values[row]).filter(|value| !value.is_nan());
                 self.both(numbers, f64::total_cmp, Bound::Float);
             }
             _ => {}

@@ -144,12 +144,8 @@ impl StepSelection {
     fn count_texts(&self, file: &TraceFile, rows: &Rows) -> Result<(), Box<Finding>> {
         for field in self.schema.fields().iter().filter(|field| *field.data_type() == DataType::Utf8) {
             let Some(at) = self.layout.position(field.name()) else { continue };
-            let Some(EntryUse { entries, used, .. }) = EntryUse::of_column(&rows.columns[at]) else { continue };
-            let bytes = |(at, used): (usize, &Option<(usize, u64)>)| {
-                Some(u64::from(entries.value_length(at).cast_unsigned()) * (*used)?.1)
-            };
-            let bytes = used.iter().enumerate().filter_map(bytes).sum();
-            let counted = file.expansion.written((rows.row_group, at), rows.first + rows.len(), bytes);
+            let Some(texts) = EntryUse::of_column(&rows.columns[at]) else { continue };
+            let counted = file.expansion.written((rows.row_group, at), rows.first + rows.len(), texts.bytes());
             counted.map_err(|exceeded| {
                 let finding = Finding::over_budget(file.name(), &exceeded).in_row_group(rows.row_group);
                 Box::new(finding.in_column(field.name()))

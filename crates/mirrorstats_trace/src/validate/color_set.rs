@@ -49,11 +49,11 @@ pub(crate) fn sightings(file: &TraceFile, layout: &Layout, episodes: &Episodes) 
     let mut found = Vec::new();
     for (held, column) in color_columns(layout, episodes) {
         let colors = distinct(held).into_iter().filter(|(name, _, _)| {
-            !name.is_empty() && column.word != Some(*name) && column.may_hold(name, file.palette())
+            !name.is_empty() && column.word != Some(name.as_str()) && column.may_hold(name, file.palette())
         });
         found.extend(colors.map(|(name, row, rows)| Sighting {
             column,
-            name: name.to_owned(),
+            name,
             rows,
             row,
             row_group: episodes.row_group(row),
@@ -73,12 +73,12 @@ fn color_columns<'a>(
     columns.filter_map(|(of, held)| Some((held, column(of.known.map_or("", |known| known.name))?)))
 }
 
-fn distinct(column: &Column) -> Vec<(&str, usize, u64)> {
+fn distinct(column: &Column) -> Vec<(String, usize, u64)> {
     // A text may have two keys.
-    let mut by_text: BTreeMap<&str, (usize, u64)> = BTreeMap::new();
-    if let Some(EntryUse { entries, used, .. }) = EntryUse::of_column(column) {
-        for (text, (row, count)) in entries.iter().zip(used).filter_map(|(text, used)| text.zip(used)) {
-            let met = by_text.entry(text).or_insert((row, 0));
+    let mut by_text: BTreeMap<String, (usize, u64)> = BTreeMap::new();
+    if let Some(texts) = EntryUse::of_column(column) {
+        for (text, row, count) in texts.first_rows(column) {
+            let met = by_text.entry(text.to_owned()).or_insert((row, 0));
             *met = (met.0.min(row), met.1 + count);
         }
     }

@@ -62,10 +62,8 @@ impl ReplyCounts {
 
     pub(crate) fn of_column(column: &Column) -> Self {
         let mut counts = Self::default();
-        if let Some(EntryUse { entries, used, .. }) = EntryUse::of_column(column) {
-            for (text, (_, rows)) in entries.iter().zip(used).filter_map(|(text, used)| text.zip(used)) {
-                counts.add(text, rows);
-            }
+        if let Some(texts) = EntryUse::of_column(column) {
+            texts.used().for_each(|(text, rows)| counts.add(text, rows));
         }
         counts
     }

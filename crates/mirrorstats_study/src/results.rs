@@ -55,7 +55,7 @@ pub struct Results {
     /// The inputs with their hashes; empty if not requested.
     pub inputs: Vec<bundle::InputFile>,
     /// The episodes that equal another one in all columns read, except for the id; empty if not requested.
-    pub(crate) alike: BTreeSet<String>,
+    pub alike: BTreeSet<String>,
 }
 
 impl Results {

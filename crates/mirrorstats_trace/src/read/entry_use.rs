@@ -24,7 +24,7 @@ impl EntryUse {
 
     /// Adds a column's rows if it has the very same entries; otherwise returns false.
     pub(crate) fn extend(&mut self, column: &Column) -> bool {
-        // The entries counted are held, so no others can have their address.
+        // These entries stay in memory, so other entries have another address.
         let is_same = entries(column).is_some_and(|entries| {
             entries.len() == self.entries.len()
                 && entries.value_offsets().as_ptr() == self.entries.value_offsets().as_ptr()

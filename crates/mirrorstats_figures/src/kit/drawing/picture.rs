@@ -89,6 +89,23 @@ impl Figure {
         )
     }
 
+    /// The figure in every format; its SVG is parsed once.
+    pub fn encode_all(&self) -> Result<Vec<(FigureFormat, Vec<u8>)>, EncodeError> {
+        #[cfg(feature = "raster")]
+        let tree = &convert::tree(&self.inline_svg()).map_err(|error| EncodeError(error.into()))?;
+        let encoded = |format: &FigureFormat| -> Result<_, Box<dyn Error + Send + Sync>> {
+            let bytes = match format {
+                FigureFormat::Svg => self.svg().into_bytes(),
+                #[cfg(feature = "raster")]
+                FigureFormat::Png => convert::png(tree)?,
+                #[cfg(feature = "raster")]
+                FigureFormat::Pdf => convert::pdf(tree)?,
+            };
+            Ok((*format, bytes))
+        };
+        Ok(FigureFormat::ALL.iter().map(encoded).collect::<Result<_, _>>()?)
+    }
+
     #[cfg(feature = "raster")]
     pub fn png(&self) -> Result<Vec<u8>, ConvertError> {
         convert::png(&convert::tree(&self.inline_svg())?)

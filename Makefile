@@ -88,7 +88,7 @@ release-check: needed
 bless: needed
 	MIRRORSTATS_WRITE_SCHEMAS=1 MIRRORSTATS_WRITE_REFERENCE=1 INSTA_UPDATE=always cargo test --workspace --all-features --no-fail-fast
 	scripts/python-types.py
-	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
+	cargo run --quiet -- report fixtures/paper --style paper --png --out reports/paper
 	cd reports/paper && sha256sum report.html >../report.html.sha256
 
 ## The bundled recordings anew: fixtures/recorded.

@@ -141,13 +141,13 @@ impl Drawings {
         self.drawn.iter().zip(svgs).map(figure).collect()
     }
 
-    /// The files of the figures. Pixels take most of the time of a report.
-    pub(crate) fn files(&self, threads: NonZeroUsize) -> Result<Vec<OutputFile>, StudyError> {
+    /// The files of the figures. PNG takes most of the time of a report that has it.
+    pub(crate) fn files(&self, threads: NonZeroUsize, png: bool) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();
         in_order(
             threads,
             &self.drawn,
-            |(name, figure)| (*name, figure.encode_all()),
+            |(name, figure)| (*name, figure.encode_all(png)),
             |(name, encoded)| {
                 files.extend(encoded?.into_iter().map(|(format, bytes)| {
                     let path = format!("figures/{name}.{}", format.ending()).into();

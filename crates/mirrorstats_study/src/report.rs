@@ -41,11 +41,13 @@ pub struct ReportOptions {
     pub style: PathBuf,
     /// True to include figures and `report.html`.
     pub figures: bool,
+    /// True to include figures as PNG too.
+    pub png: bool,
 }
 
 impl Default for ReportOptions {
     fn default() -> Self {
-        Self { style: PathBuf::from("default"), figures: true }
+        Self { style: PathBuf::from("default"), figures: true, png: false }
     }
 }
 
@@ -95,7 +97,7 @@ pub fn report(study: &Study, options: &ReportOptions) -> Result<Report, StudyErr
     let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
     let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
     let grouped = study.grouped_with(outputs)?;
-    let illustrations = options.figures.then(|| Illustrations::of(&grouped, &style)).transpose()?;
+    let illustrations = options.figures.then(|| Illustrations::of(&grouped, &style, options.png)).transpose()?;
     let (tables, ranks) = grouped.tables(&style)?;
     let Grouped { counted, cells, .. } = grouped;
     let replies = counted.replies().and_then(|replies| replies.sentence());
@@ -132,12 +134,12 @@ struct Illustrations {
 }
 
 impl Illustrations {
-    fn of(grouped: &Grouped<'_>, style: &Style) -> Result<Self, StudyError> {
+    fn of(grouped: &Grouped<'_>, style: &Style, png: bool) -> Result<Self, StudyError> {
         thread::scope(|scope| {
             let statistics = scope.spawn(|| statistics(grouped, &Options::default()));
             let figures = FigureInputs::of_a_report(&grouped.counted.results, style).and_then(|inputs| {
                 let drawings = inputs.draw_all();
-                let files = drawings.files(grouped.study.threads)?;
+                let files = drawings.files(grouped.study.threads, png)?;
                 Ok((drawings, files))
             });
             let statistics = statistics.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;

@@ -89,8 +89,8 @@ impl Figure {
         )
     }
 
-    /// The figure in every format; its SVG is parsed once.
-    pub fn encode_all(&self) -> Result<Vec<(FigureFormat, Vec<u8>)>, EncodeError> {
+    /// The figure in every format, as PNG only if asked for; its SVG is parsed once.
+    pub fn encode_all(&self, png: bool) -> Result<Vec<(FigureFormat, Vec<u8>)>, EncodeError> {
         #[cfg(feature = "raster")]
         let tree = &convert::tree(&self.inline_svg()).map_err(|error| EncodeError(error.into()))?;
         let encoded = |format: &FigureFormat| -> Result<_, Box<dyn Error + Send + Sync>> {
@@ -103,7 +103,8 @@ impl Figure {
             };
             Ok((*format, bytes))
         };
-        Ok(FigureFormat::ALL.iter().map(encoded).collect::<Result<_, _>>()?)
+        let formats = FigureFormat::ALL.iter().filter(|format| png || format.ending() != "png");
+        Ok(formats.map(encoded).collect::<Result<_, _>>()?)
     }
 
     #[cfg(feature = "raster")]

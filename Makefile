@@ -1,7 +1,7 @@
 # The commands of the README: `make demo`, `make test` and `make test-all`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test test-all check-default others fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check check-lerobot recorded calibrate questions bench bench-import bench-scores bench-world bench-agents bench-view sheet
+.PHONY: demo test test-all check-default others fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check check-lerobot recorded calibrate questions bench bench-import bench-scores bench-shape bench-world bench-agents bench-view instructions bless-instructions instruction-programs sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -10,8 +10,8 @@ demo:
 ## What a change needs: format, clippy, unit and boundary tests, doc examples, the published tables from outside.
 test: fmt lint unit end-to-end
 
-## The rest of what CI checks: programs of others, power cuts, the browser suite, long rounds, the book, the wheel.
-test-all: test check-default others docs test-wheel
+## The rest of what CI checks: programs of others, power cuts, the browser suite, long rounds, instructions, the book, the wheel.
+test-all: test check-default others instructions docs test-wheel
 
 # Tests that take most of the time, by their modules: `make test` skips them, `make test-all` runs them.
 LONG = accessible:: calibration:: documented_command_lines faults:: foreign:: hostile:: html::address html::episodes \
@@ -88,7 +88,7 @@ release-check: needed
 bless: needed
 	MIRRORSTATS_WRITE_SCHEMAS=1 MIRRORSTATS_WRITE_REFERENCE=1 INSTA_UPDATE=always cargo test --workspace --all-features --no-fail-fast
 	scripts/python-types.py
-	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
+	cargo run --quiet -- report fixtures/paper --style paper --png --out reports/paper
 	cd reports/paper && sha256sum report.html >../report.html.sha256
 
 ## The bundled recordings anew: fixtures/recorded.
@@ -129,6 +129,28 @@ bench-scores:
 	PYTHONPATH=$(BENCH_PYTHON) python3 scripts/bench/bench.py --program $${CARGO_TARGET_DIR:-target}/release/mirrorstats \
 		--steps $(STEPS) --files $(FILES) --rounds $(ROUNDS) --large $(LARGE) \
 		--results $(BENCH_RESULTS)
+
+## How time and memory grow with steps, episodes, files, models, metrics and columns: benches/SHAPE.md, in minutes.
+bench-shape:
+	mkdir -p target/bench
+	cargo build --release --no-default-features --bin mirrorstats --example generate
+	python3 scripts/bench/shape.py --program $${CARGO_TARGET_DIR:-target}/release/mirrorstats
+
+## The instructions of commands on a small trace: more than 3 % more than in benches/instructions.txt fails. The program is
+## that of bench-scores. The generator is that of the tests, which are built already where CI comes here.
+INSTRUCTIONS = $${CARGO_TARGET_DIR:-target}/release/mirrorstats $${CARGO_TARGET_DIR:-target}/debug/examples/generate
+instructions: instruction-programs
+	scripts/bench/instructions.py $(INSTRUCTIONS)
+
+## Write benches/instructions.txt anew.
+bless-instructions: instruction-programs
+	scripts/bench/instructions.py $(INSTRUCTIONS) --bless
+
+instruction-programs:
+	scripts/get-valgrind.sh
+	scripts/get-mujoco.sh
+	cargo build --release --no-default-features --bin mirrorstats
+	cargo build --workspace --all-features --example generate
 
 ## How fast the world is: steps a second with and without frames, and where the time goes.
 bench-world:

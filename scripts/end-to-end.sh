@@ -22,7 +22,7 @@ fetch() {
 }
 
 echo "end-to-end: the committed report, byte for byte"
-mirrorstats report fixtures/paper --style paper --out "$out/paper" >"$out/main.txt"
+mirrorstats report fixtures/paper --style paper --png --out "$out/paper" >"$out/main.txt"
 diff -r --exclude=report.html reports/paper "$out/paper"
 # The page is large; what is committed of it is its hash.
 page=$PWD/reports/report.html.sha256

@@ -13,7 +13,7 @@
 //! # fn main() -> Result<(), StudyError> {
 //! let study = Study::open(["fixtures/paper"])?.definitions("paper")?;
 //! assert_eq!(study.score()?.episodes.len(), 840);
-//! let report = report(&study, &ReportOptions { style: "paper".into(), figures: false })?;
+//! let report = report(&study, &ReportOptions { style: "paper".into(), figures: false, png: false })?;
 //! assert!(report.table("main")?.printed().markdown().contains("Claude Sonnet 4.6"));
 //! # Ok(())
 //! # }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 
-use generation::{Failure, Files, Order, Study};
+use generation::{Failure, Files, Order, Study, Values, Wild};
 
 /// Generate traces for benchmarks
 #[derive(Debug, Parser)]
@@ -27,6 +27,12 @@ struct Arguments {
     /// Write optional columns too, with values that hardly repeat: poses, pixels, tokens, costs, times, reasons.
     #[arg(long)]
     optional: bool,
+    /// Write files as pyarrow does, without our checksums: drawn keys that many episodes share, and poses, costs and texts
+    /// that hardly repeat.
+    #[arg(long, conflicts_with = "optional")]
+    wild: bool,
+    #[command(flatten)]
+    shape: Wild,
     /// Files, divided at episodes.
     #[arg(long, default_value_t = 4)]
     files: usize,
@@ -39,7 +45,12 @@ struct Arguments {
 }
 
 fn main() -> Result<(), Failure> {
-    let Arguments { steps, order, seed, optional, files, threads, out } = Arguments::parse();
-    let study = Study::new(seed, steps, optional);
+    let Arguments { steps, order, seed, optional, wild, shape, files, threads, out } = Arguments::parse();
+    let values = match (wild, optional) {
+        (true, _) => Values::Wild(shape),
+        (false, true) => Values::Optional,
+        (false, false) => Values::Required,
+    };
+    let study = Study::new(seed, steps, values);
     generation::write(&study, order, &Files { folder: out, count: files, threads })
 }

@@ -170,7 +170,7 @@ pub fn styled(data: &[u8]) {
     let Some(study) = study("styled.csv", scores) else { return };
     reached("open");
     let study = study.threads(NonZeroUsize::MIN).pool();
-    if let Some(report) = bounded(|| report(&study, &ReportOptions { style, figures: false }).ok()) {
+    if let Some(report) = bounded(|| report(&study, &ReportOptions { style, figures: false, png: false }).ok()) {
         reached("report");
         assert!(!report.tables.is_empty());
     }

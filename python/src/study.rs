@@ -65,7 +65,8 @@ impl Asked {
 
 impl Study {
     fn tables_of(&self, style: String) -> PyResult<mirrorstats::Report> {
-        report::report(&self.inner, &ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)
+        report::report(&self.inner, &ReportOptions { style: style.into(), figures: false, png: false })
+            .map_err(error::of_study)
     }
 }
 
@@ -137,7 +138,7 @@ impl Study {
 
     fn report(&self, py: Python<'_>, out: &str, style: String, figures: bool) -> PyResult<Answer> {
         let (written, notes) = py.detach(|| {
-            let options = ReportOptions { style: style.into(), figures };
+            let options = ReportOptions { style: style.into(), figures, png: false };
             let out = Path::new(out);
             report::check_folder(&self.inner, out, &options).map_err(error::of_study)?;
             let report = report::report(&self.inner, &options).map_err(error::of_study)?;

@@ -3,7 +3,8 @@
 `make bench-scores` calls it; `--help` lists what may be changed. The data is generated in two orders: as a study is
 recorded, and shuffled. Every contender runs once before any is timed, and its result is compared with ours row by row;
 a difference is an error. Then all take turns. A third set has the optional columns of a recording, with values that
-hardly repeat: its pages are larger, and the columns that are read are a small part of each file.
+hardly repeat: its pages are larger, and the columns that are read are a small part of each file. The last two sets are as
+other programs write them, once without checksums and once sealed.
 """
 
 import argparse
@@ -28,6 +29,7 @@ OPTIONS = {
     table.SHUFFLED: ["--order", "shuffled"],
     table.STUDY: ["--order", "study"],
     table.RECORDED: ["--order", "shuffled", "--optional"],
+    table.WILD: ["--wild"],
 }
 
 
@@ -42,19 +44,29 @@ class Bench:
         self.outputs.mkdir(parents=True, exist_ok=True)
 
     def generate(self, data, steps, files):
-        """A folder of traces, made by this build of the generator; folders of other builds are removed."""
+        """A folder of traces, made by these builds of the generator and of `trace seal`; folders of other builds are removed."""
         generator = self.examples / "generate"
         name = f"{data}-{steps}-in-{files}"
-        folder = self.data / f"{name}-{digest(generator)}"
+        made_by = digest(generator) + (digest(self.program) if data == table.SEALED else "")
+        folder = self.data / f"{name}-{made_by}"
         if not folder.is_dir():
             for old in self.data.glob(f"{name}-*"):
                 timing.remove(old)
             partial = self.data / "partial"
             timing.remove(partial)
-            options = [*OPTIONS[data], "--steps", str(steps), "--files", str(files), "--out", partial]
-            subprocess.run([generator, *options], check=True)
+            if data == table.SEALED:
+                self.seal(self.generate(table.WILD, steps, files), partial)
+            else:
+                options = [*OPTIONS[data], "--steps", str(steps), "--files", str(files), "--out", partial]
+                subprocess.run([generator, *options], check=True)
             partial.rename(folder)
         return folder
+
+    def seal(self, traces, folder):
+        """Copies of traces with checksums."""
+        folder.mkdir()
+        for trace in sorted(traces.glob("*.parquet")):
+            timing.run([self.program, "trace", "seal", trace, folder / trace.name])
 
     def statements(self):
         """The generated SQL, as files by dialect."""
@@ -100,6 +112,13 @@ def versions(program):
     return ", ".join(found) + f", Python {platform.python_version()}"
 
 
+def commit():
+    """The commit that is measured; its name ends in `-dirty` if files differ from it."""
+    command = ["git", "-C", REPOSITORY, "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"]
+    found = subprocess.run(command, capture_output=True, text=True)
+    return found.stdout.strip() if found.returncode == 0 else "unknown"
+
+
 def megabytes(folder):
     return sum(path.stat().st_size for path in folder.glob("*.parquet")) / 2**20
 
@@ -110,10 +129,13 @@ def preamble(bench, options, folders, episodes, load):
         "# Results of `make bench-scores`",
         "",
         f"Machine: {machine()}; load average {load:.2f} before the first round.  ",
+        f"Commit: {commit()}.  ",
         f"Versions: {versions(bench.program)}.  ",
         f"Traces: {options.steps:,} steps, {episodes:,} episodes, {options.files} files, zstd: {sizes}",
         "(`examples/generate`); warm cache. `shuffled` and `study` have the required columns alone, `recorded` is shuffled and",
-        "has the optional columns of a recording with a model, whose values hardly repeat.  ",
+        "has the optional columns of a recording with a model, whose values hardly repeat. `wild` is as other programs write",
+        "traces: without checksums, many episodes with the same model, experiment, seed and run, and actions, colours, poses,",
+        "costs and texts that change with every step. `sealed` is `wild` after `trace seal`.  ",
         f"Rounds: {options.rounds}; in each, every line of the table has one turn on each set.",
         "",
         "Before the first round, every line ran once and was checked. Each episode table has the same rows in the same order as",

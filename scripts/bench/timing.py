@@ -15,7 +15,8 @@ import sys
 import tempfile
 import time
 
-Run = collections.namedtuple("Run", "seconds megabytes")
+# `processor`: the seconds of all threads on the processor.
+Run = collections.namedtuple("Run", "seconds megabytes processor")
 
 # `command(folder, out)` gives the arguments. `out` is what it writes: a name in the benchmark's folder, or None.
 # `inside`: the command prints its own seconds. `own`: it belongs to this repository, so it must not fail.
@@ -42,7 +43,7 @@ def run(command, inside=False):
         printed = out.read()
         if inside:
             seconds = float(printed.split()[-1])
-        return Run(seconds, usage.ru_maxrss / 1024), printed
+        return Run(seconds, usage.ru_maxrss / 1024, usage.ru_utime + usage.ru_stime), printed
 
 
 def last_line(text):

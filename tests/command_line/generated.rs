@@ -5,7 +5,7 @@ use std::path::Path;
 
 use mirrorstats_trace::schema::COLUMNS;
 
-use crate::generation::{self, Files, OPTIONAL_COLUMNS, Order, Study};
+use crate::generation::{self, Files, OPTIONAL_COLUMNS, Order, Study, Values, Wild};
 use crate::harness::traces::{score_values, texts};
 use crate::{contents, run};
 
@@ -30,10 +30,12 @@ fn generated_traces_of_both_orders_keep_every_rule_and_score_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let mut scores = BTreeSet::new();
-    for (name, order, optional) in
-        [("study", Order::Study, false), ("shuffled", Order::Shuffled, false), ("optional", Order::Shuffled, true)]
-    {
-        let study = Study::new(7, STEPS, optional);
+    for (name, order, values) in [
+        ("study", Order::Study, Values::Required),
+        ("shuffled", Order::Shuffled, Values::Required),
+        ("optional", Order::Shuffled, Values::Optional),
+    ] {
+        let study = Study::new(7, STEPS, values);
         generate(at, name, &study, order);
         assert_eq!(contents(&at.join(name)).len(), FILES);
         let validated = run(at, &["trace", "validate", name, "--json"]).done();
@@ -46,10 +48,38 @@ fn generated_traces_of_both_orders_keep_every_rule_and_score_the_same() {
         assert_eq!((info["steps"].as_u64(), info["episodes"].as_u64()), (Some(STEPS), Some(study.episodes())));
         let required = COLUMNS.iter().filter(|column| column.required).count();
         let columns = info["columns"].as_array().unwrap().len();
-        assert_eq!(columns, if optional { required + OPTIONAL_COLUMNS.len() } else { required }, "{name}");
+        assert_eq!(
+            columns,
+            if values == Values::Optional { required + OPTIONAL_COLUMNS.len() } else { required },
+            "{name}"
+        );
         scores.insert(score_values(&run(at, &["score", name]).done()));
     }
     assert_eq!(scores.len(), 1, "the order, or an optional column, changes a score");
+}
+
+#[test]
+fn wild_traces_are_those_of_another_program_and_sealed_ones_score_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let study = Study::new(7, STEPS, Values::Wild(Wild { longest: 20, models: 4, columns: 5 }));
+    generate(at, "wild", &study, Order::Study);
+    generate(at, "again", &study, Order::Study);
+    assert_eq!(contents(&at.join("wild")), contents(&at.join("again")));
+    let validated = run(at, &["trace", "validate", "wild"]).done();
+    assert!(validated.contains("0 errors, 0 notes"), "{validated}");
+    let info: serde_json::Value = serde_json::from_str(&run(at, &["trace", "info", "wild", "--json"]).done()).unwrap();
+    assert_eq!((info["steps"].as_u64(), info["episodes"].as_u64()), (Some(STEPS), Some(study.episodes())));
+    let keys = 4 * 5 * 3 * 7;
+    assert!(study.episodes() > keys, "so that most keys repeat");
+    std::fs::create_dir(at.join("sealed")).unwrap();
+    for file in 0..FILES {
+        let [from, to] = ["wild", "sealed"].map(|folder| format!("{folder}/steps-{file:03}.parquet"));
+        let text = String::from_utf8_lossy(&std::fs::read(at.join(&from)).unwrap()).into_owned();
+        assert!(!text.contains("mirrorstats"), "a foreign file names us in its footer");
+        run(at, &["trace", "seal", &from, &to]).done();
+    }
+    assert_eq!(run(at, &["score", "wild"]).done(), run(at, &["score", "sealed"]).done());
 }
 
 #[test]
@@ -57,7 +87,7 @@ fn generated_traces_depend_on_the_seed_alone() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     for (name, seed) in [("first", 7), ("again", 7), ("other", 8)] {
-        generate(at, name, &Study::new(seed, STEPS, false), Order::Shuffled);
+        generate(at, name, &Study::new(seed, STEPS, Values::Required), Order::Shuffled);
     }
     assert_eq!(contents(&at.join("first")), contents(&at.join("again")));
     assert_ne!(run(at, &["score", "first"]).done(), run(at, &["score", "other"]).done());
@@ -69,7 +99,7 @@ fn the_shuffled_order_has_every_model_in_every_file() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     // More than 735 episodes, so that every model occurs.
-    let study = Study::new(7, 60_000, false);
+    let study = Study::new(7, 60_000, Values::Required);
     for (name, order) in [("study", Order::Study), ("shuffled", Order::Shuffled)] {
         generate(at, name, &study, order);
         for file in 0..FILES {

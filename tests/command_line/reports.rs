@@ -63,6 +63,21 @@ fn a_manifest_lists_the_written_files() {
     assert_eq!(answer["files"].as_array().unwrap().len(), manifest["outputs"].as_array().unwrap().len() + 1);
 }
 
+#[cfg(feature = "raster")]
+#[test]
+fn png_on_request_changes_no_other_file() {
+    let folder = two_files();
+    let is_png = |path: &String| path.ends_with(".png");
+    let plain = fresh(folder.path(), &["a.parquet", "--threads", "1"]);
+    let mut with_png = fresh(folder.path(), &["a.parquet", "--threads", "3", "--png"]);
+    let figures = plain.keys().filter(|path| path.ends_with(".pdf")).count();
+    assert_eq!((plain.keys().filter(|path| is_png(path)).count(), figures > 0), (0, true));
+    assert_eq!(with_png.keys().filter(|path| is_png(path)).count(), figures);
+    // The manifest lists the files.
+    with_png.retain(|path, _| !is_png(path) && path != "manifest.json");
+    assert!(with_png.iter().all(|(path, bytes)| plain.get(path) == Some(bytes)) && with_png.len() == plain.len() - 1);
+}
+
 #[test]
 fn an_older_report_is_removed_and_other_files_are_kept() {
     let folder = two_files();

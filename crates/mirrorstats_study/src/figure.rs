@@ -2,18 +2,20 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use crate::gate::{check_metric, leading_metric};
 use crate::results::{Outputs, Results};
 use crate::{Study, StudyError};
-use mirrorstats_figures::{Figure, FigureError, FigureFormat, FigureName, FigureWidth, Input};
+use mirrorstats_figures::{Figure, FigureError, FigureName, FigureWidth, Input};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle::OutputFile;
 use mirrorstats_report::html;
 use mirrorstats_report::style::Style;
 use mirrorstats_score::cells::Cells;
 use mirrorstats_score::cells::group::{DEFAULT_BY, group};
+use mirrorstats_trace::read::in_order::in_order;
 
 /// The options of a figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,14 +141,21 @@ impl Drawings {
         self.drawn.iter().zip(svgs).map(figure).collect()
     }
 
-    pub(crate) fn files(&self) -> Result<Vec<OutputFile>, StudyError> {
+    /// The files of the figures. PNG takes most of the time of a report that has it.
+    pub(crate) fn files(&self, threads: NonZeroUsize, png: bool) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();
-        for (name, figure) in &self.drawn {
-            for format in FigureFormat::ALL {
-                let path = format!("figures/{name}.{}", format.ending()).into();
-                files.push(OutputFile { path, bytes: format.encode(figure)? });
-            }
-        }
+        in_order(
+            threads,
+            &self.drawn,
+            |(name, figure)| (*name, figure.encode_all(png)),
+            |(name, encoded)| {
+                files.extend(encoded?.into_iter().map(|(format, bytes)| {
+                    let path = format!("figures/{name}.{}", format.ending()).into();
+                    OutputFile { path, bytes }
+                }));
+                Ok::<_, StudyError>(())
+            },
+        )?;
         Ok(files)
     }
 }

@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use crate::caveats::{departed, selection};
 use crate::copies::copies;
@@ -40,11 +41,13 @@ pub struct ReportOptions {
     pub style: PathBuf,
     /// True to include figures and `report.html`.
     pub figures: bool,
+    /// True to include figures as PNG too.
+    pub png: bool,
 }
 
 impl Default for ReportOptions {
     fn default() -> Self {
-        Self { style: PathBuf::from("default"), figures: true }
+        Self { style: PathBuf::from("default"), figures: true, png: false }
     }
 }
 
@@ -94,7 +97,7 @@ pub fn report(study: &Study, options: &ReportOptions) -> Result<Report, StudyErr
     let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
     let outputs = Outputs { losses: true, quality: true, hashes: true, alike: true, ..Outputs::of_figures(figures) };
     let grouped = study.grouped_with(outputs)?;
-    let statistics = options.figures.then(|| statistics(&grouped, &Options::default())).transpose()?;
+    let illustrations = options.figures.then(|| Illustrations::of(&grouped, &style, options.png)).transpose()?;
     let (tables, ranks) = grouped.tables(&style)?;
     let Grouped { counted, cells, .. } = grouped;
     let replies = counted.replies().and_then(|replies| replies.sentence());
@@ -118,10 +121,31 @@ pub fn report(study: &Study, options: &ReportOptions) -> Result<Report, StudyErr
         read: study.files_read(Some(&options.style)),
         inputs: study.inputs.len(),
     };
-    if let Some(statistics) = &statistics {
-        report.illustrate(statistics)?;
+    if let Some(illustrations) = illustrations {
+        report.illustrate(illustrations)?;
     }
     Ok(report)
+}
+
+/// The parts of a report that take longest. Figures do not wait for the statistics beside them.
+struct Illustrations {
+    statistics: Statistics,
+    figures: Result<(Drawings, Vec<OutputFile>), StudyError>,
+}
+
+impl Illustrations {
+    fn of(grouped: &Grouped<'_>, style: &Style, png: bool) -> Result<Self, StudyError> {
+        thread::scope(|scope| {
+            let statistics = scope.spawn(|| statistics(grouped, &Options::default()));
+            let figures = FigureInputs::of_a_report(&grouped.counted.results, style).and_then(|inputs| {
+                let drawings = inputs.draw_all();
+                let files = drawings.files(grouped.study.threads, png)?;
+                Ok((drawings, files))
+            });
+            let statistics = statistics.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+            Ok(Self { statistics, figures })
+        })
+    }
 }
 
 fn recordings(study: &Study, manifest: &Manifest) -> Option<Recordings> {
@@ -217,14 +241,14 @@ impl Report {
         Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
     }
 
-    fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
-        let drawings = FigureInputs::of_a_report(&self.results, &self.style)?.draw_all();
+    fn illustrate(&mut self, illustrations: Illustrations) -> Result<(), StudyError> {
+        let (drawings, files) = illustrations.figures?;
         self.notes.extend(drawings.left_out.iter().map(|(name, reason)| format!("no figure `{name}`: {reason}")));
-        self.illustrations = drawings.files()?;
+        self.illustrations = files;
         if self.results.episodes.len() > MOST_LISTED {
             self.notes.push(format!("no report.html: it lists at most {MOST_LISTED} episodes"));
         } else {
-            let bytes = self.page(&drawings, statistics)?.into_bytes();
+            let bytes = self.page(&drawings, &illustrations.statistics)?.into_bytes();
             self.illustrations.push(OutputFile { path: "report.html".into(), bytes });
         }
         Ok(())

@@ -54,7 +54,8 @@ impl RescoreRequest {
     pub fn run(&self) -> Result<Rescored, StudyError> {
         let manifest = provenance::manifest(&self.report)?;
         let figures = self.report.join("figures").is_dir() || self.report.join("report.html").is_file();
-        let options = ReportOptions { style: self.style(&manifest)?, figures };
+        let png = manifest.outputs.iter().any(|file| file.path.ends_with(".png"));
+        let options = ReportOptions { style: self.style(&manifest)?, figures, png };
         let study = Study::of(self.traces.clone())?.threads(self.threads).asked(self.question(&manifest))?;
         study.traces()?;
         check_folder(&study, &self.out, &options)?;

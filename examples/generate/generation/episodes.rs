@@ -1,5 +1,6 @@
 //! The generated study: models by experiments by seeds by runs, and the steps of each episode.
 
+use clap::Args;
 use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 
 use super::draw::Draw;
@@ -24,14 +25,45 @@ const RUNS: u64 = 7;
 /// The longest episode, in steps.
 const LIMIT: u64 = 100;
 
+/// The columns of a study and their writer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Values {
+    /// The required columns alone.
+    Required,
+    /// Optional columns too.
+    Optional,
+    /// Columns as other programs write them, drawn for each step.
+    Wild(Wild),
+}
+
+/// The shape of wild data.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Args)]
+pub struct Wild {
+    /// The longest episode of --wild, in steps.
+    #[arg(long, default_value_t = LIMIT)]
+    pub longest: u64,
+    /// The models of --wild.
+    #[arg(long, default_value_t = 4)]
+    pub models: u64,
+    /// Columns of --wild that no definition reads.
+    #[arg(long, default_value_t = 3)]
+    pub columns: usize,
+}
+
+impl Values {
+    fn longest(self) -> u64 {
+        if let Self::Wild(wild) = self { wild.longest } else { LIMIT }
+    }
+}
+
 /// The study to generate.
 pub struct Study {
     /// Another seed gives other episodes.
     pub seed: u64,
     /// The steps of all episodes together.
     pub steps: u64,
-    /// True if steps have values in optional columns.
-    pub optional: bool,
+    /// The columns and their writer.
+    pub values: Values,
     episodes: u64,
     /// The number of steps of the last episode, which is cut so that the total is `steps`.
     last: u64,
@@ -39,14 +71,14 @@ pub struct Study {
 
 impl Study {
     /// A study with as many episodes as `steps` steps need, at least 1.
-    pub fn new(seed: u64, steps: u64, optional: bool) -> Self {
+    pub fn new(seed: u64, steps: u64, values: Values) -> Self {
         let (mut episodes, mut last, mut left) = (0, 0, steps);
         while left > 0 {
-            last = drawn_length(&mut Draw::of(seed, episodes)).min(left);
+            last = drawn_length(values.longest(), &mut Draw::of(seed, episodes)).min(left);
             left -= last;
             episodes += 1;
         }
-        Self { seed, steps, optional, episodes, last }
+        Self { seed, steps, values, episodes, last }
     }
 
     /// The number of episodes.
@@ -56,13 +88,17 @@ impl Study {
 
     /// The number of steps of an episode.
     pub fn length(&self, number: u64) -> u64 {
-        if number + 1 == self.episodes { self.last } else { drawn_length(&mut Draw::of(self.seed, number)) }
+        if number + 1 == self.episodes {
+            self.last
+        } else {
+            drawn_length(self.values.longest(), &mut Draw::of(self.seed, number))
+        }
     }
 
     /// The episode with this number.
     pub fn episode(&self, number: u64) -> Episode {
         let mut draw = Draw::of(self.seed, number);
-        let drawn_length = drawn_length(&mut draw);
+        let drawn_length = drawn_length(LIMIT, &mut draw);
         let (model, experiment, seed, run) = cell(number);
         let body_color = draw.one(&COLORS[..3]);
         let mut scene = Scene::new(body_color, &mut draw);
@@ -79,7 +115,7 @@ impl Study {
             steps,
             ..Episode::default()
         };
-        if self.optional {
+        if self.values == Values::Optional {
             // Separate draws, so that the required columns are the same with and without the optional ones.
             extras::fill(&mut episode, number, &mut Draw::of(!self.seed, number));
         }
@@ -88,8 +124,8 @@ impl Study {
 }
 
 /// The number of steps before any cut.
-fn drawn_length(draw: &mut Draw) -> u64 {
-    if draw.percent(41) { LIMIT } else { 1 + draw.below(LIMIT) }
+fn drawn_length(longest: u64, draw: &mut Draw) -> u64 {
+    if draw.percent(41) { longest } else { 1 + draw.below(longest) }
 }
 
 /// Model, experiment, seed and run of an episode, in the order in which a study is recorded.

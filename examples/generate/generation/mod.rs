@@ -1,12 +1,13 @@
 //! Generates a study: its episodes, their order, and their files.
 //!
 //! Rule: an episode depends only on the seed and its number. The order, the number of files, the number of threads and
-//! the optional columns change no value of a required column.
+//! the optional columns change no value of a required column. Wild files have other values.
 
 mod draw;
 mod episodes;
 mod extras;
 mod order;
+mod wild;
 
 use std::error::Error;
 use std::fs;
@@ -17,7 +18,7 @@ use std::thread;
 
 use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
-pub use episodes::Study;
+pub use episodes::{Study, Values, Wild};
 pub use order::Order;
 
 /// The optional columns of a generated trace: those of a recording with a model, except its longest texts.
@@ -97,7 +98,11 @@ fn shares(study: &Study, numbers: &[u32], files: usize) -> Vec<Range<usize>> {
 }
 
 fn write_file(study: &Study, numbers: &[u32], path: &Path) -> Result<(), Failure> {
-    let names: &[&str] = if study.optional { &OPTIONAL_COLUMNS } else { &[] };
+    let names: &[&str] = match study.values {
+        Values::Wild(shape) => return wild::write_file(study, shape, numbers, path),
+        Values::Optional => &OPTIONAL_COLUMNS,
+        Values::Required => &[],
+    };
     let columns = OptionalColumns::named(names).ok_or("a column that the schema does not have")?;
     let mut writer = TraceWriter::create(path, &TraceMetadata { recording: None, columns })?;
     for number in numbers {

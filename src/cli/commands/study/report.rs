@@ -31,6 +31,10 @@ pub struct ReportArgs {
     /// Write only tables, cells and provenance: no figures and no report.html
     #[arg(long)]
     pub no_figures: bool,
+    /// Draw each figure as PNG too, which takes longer than SVG and PDF together
+    #[cfg(feature = "raster")]
+    #[arg(long, conflicts_with = "no_figures")]
+    pub png: bool,
     /// A registered plan: each departure of the analysis from it is listed
     #[arg(long, value_name = "FILE")]
     pub plan: Option<PathBuf>,
@@ -58,7 +62,11 @@ impl ReportArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let study = self.traces.study(&self.scoring, &self.grouping)?;
         let study = with_plan(study, self.plan.as_deref())?;
-        let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
+        #[cfg(feature = "raster")]
+        let png = self.png;
+        #[cfg(not(feature = "raster"))]
+        let png = false;
+        let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures, png };
         report::check_folder(&study, &self.out, &options)?;
         let report = report::report(&study, &options)?;
         output::notes(&report.notes);

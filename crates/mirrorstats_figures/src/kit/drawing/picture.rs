@@ -89,6 +89,24 @@ impl Figure {
         )
     }
 
+    /// The figure in every format, as PNG only if asked for; its SVG is parsed once.
+    pub fn encode_all(&self, png: bool) -> Result<Vec<(FigureFormat, Vec<u8>)>, EncodeError> {
+        #[cfg(feature = "raster")]
+        let tree = &convert::tree(&self.inline_svg()).map_err(|error| EncodeError(error.into()))?;
+        let encoded = |format: &FigureFormat| -> Result<_, Box<dyn Error + Send + Sync>> {
+            let bytes = match format {
+                FigureFormat::Svg => self.svg().into_bytes(),
+                #[cfg(feature = "raster")]
+                FigureFormat::Png => convert::png(tree)?,
+                #[cfg(feature = "raster")]
+                FigureFormat::Pdf => convert::pdf(tree)?,
+            };
+            Ok((*format, bytes))
+        };
+        let formats = FigureFormat::ALL.iter().filter(|format| png || format.ending() != "png");
+        Ok(formats.map(encoded).collect::<Result<_, _>>()?)
+    }
+
     #[cfg(feature = "raster")]
     pub fn png(&self) -> Result<Vec<u8>, ConvertError> {
         convert::png(&convert::tree(&self.inline_svg())?)

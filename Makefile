@@ -10,8 +10,8 @@ demo:
 ## What a change needs: format, clippy, unit and boundary tests, doc examples, the published tables from outside.
 test: fmt lint unit end-to-end
 
-## The rest of what CI checks: programs of others, power cuts, the browser suite, long rounds, instructions, the book, the wheel.
-test-all: test check-default others instructions docs test-wheel
+## The rest of what CI checks: programs of others, power cuts, the browser suite, long rounds, the book, the wheel.
+test-all: test check-default others docs test-wheel
 
 # Tests that take most of the time, by their modules: `make test` skips them, `make test-all` runs them.
 LONG = accessible:: calibration:: documented_command_lines faults:: foreign:: hostile:: html::address html::episodes \

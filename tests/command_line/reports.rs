@@ -67,10 +67,11 @@ fn a_manifest_lists_the_written_files() {
 #[test]
 fn png_on_request_changes_no_other_file() {
     let folder = two_files();
-    let is_png = |path: &String| path.ends_with(".png");
+    let ends = |path: &String, ending: &str| Path::new(path).extension().is_some_and(|found| found == ending);
+    let is_png = |path: &String| ends(path, "png");
     let plain = fresh(folder.path(), &["a.parquet", "--threads", "1"]);
     let mut with_png = fresh(folder.path(), &["a.parquet", "--threads", "3", "--png"]);
-    let figures = plain.keys().filter(|path| path.ends_with(".pdf")).count();
+    let figures = plain.keys().filter(|path| ends(path, "pdf")).count();
     assert_eq!((plain.keys().filter(|path| is_png(path)).count(), figures > 0), (0, true));
     assert_eq!(with_png.keys().filter(|path| is_png(path)).count(), figures);
     // The manifest lists the files.

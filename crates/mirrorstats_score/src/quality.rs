@@ -361,7 +361,7 @@ fn each<T: ArrowPrimitiveType>(column: Option<&ArrayRef>, rows: Range<usize>, mu
 /// The nearest integer, halves away from zero. The function `round` and integers of 128 bits took half of the time.
 #[expect(clippy::cast_possible_truncation, reason = "a cost of a reply is far below 2^127 billionths")]
 fn rounded(value: f64) -> i128 {
-    const EXACT: f64 = (1_i64 << 52) as f64;
+    const EXACT: f64 = 4_503_599_627_370_496.0; // 2^52
     if value.abs() >= EXACT {
         return value.round() as i128;
     }

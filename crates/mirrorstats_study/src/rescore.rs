@@ -12,7 +12,7 @@ use crate::question::Question;
 use crate::report::{Report, ReportOptions, check_folder, report};
 use crate::{Study, StudyError, provenance};
 use mirrorstats_exact::input;
-use mirrorstats_report::bundle::Manifest;
+use mirrorstats_report::bundle::{Manifest, Output};
 use mirrorstats_report::style::Style;
 use mirrorstats_score::format::{self, Partition};
 use mirrorstats_score::tables::table::EpisodeTable;
@@ -54,7 +54,8 @@ impl RescoreRequest {
     pub fn run(&self) -> Result<Rescored, StudyError> {
         let manifest = provenance::manifest(&self.report)?;
         let figures = self.report.join("figures").is_dir() || self.report.join("report.html").is_file();
-        let png = manifest.outputs.iter().any(|file| file.path.ends_with(".png"));
+        let is_png = |file: &Output| Path::new(&file.path).extension().is_some_and(|ending| ending == "png");
+        let png = manifest.outputs.iter().any(is_png);
         let options = ReportOptions { style: self.style(&manifest)?, figures, png };
         let study = Study::of(self.traces.clone())?.threads(self.threads).asked(self.question(&manifest))?;
         study.traces()?;

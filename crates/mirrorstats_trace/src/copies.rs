@@ -48,6 +48,8 @@ pub fn copies(set: &TraceSet, may_be: &BTreeSet<String>, threads: NonZeroUsize) 
         };
         for (episode, print) in episodes {
             match first.get(&print) {
+                // An id that comes twice is another finding.
+                Some(of) if *of == episode => {}
                 Some(of) => found.push(Copied { episode, of: String::clone(of) }),
                 None => drop(first.insert(print, episode)),
             }

@@ -285,7 +285,9 @@ struct Alike {
 impl Alike {
     fn add(&mut self, file: usize, prints: Vec<u64>, starts: &[Start]) {
         self.prints.extend(prints);
-        starts.iter().for_each(|start| self.ids.append_value(&start.id));
+        for start in starts {
+            self.ids.append_value(&start.id);
+        }
         self.ends.push((self.prints.len(), file));
     }
 

@@ -79,7 +79,7 @@ pub struct Outputs<'a> {
     /// Columns whose values are taken unchanged, unless the first definitions read them.
     pub unchecked: &'a [&'a str],
     /// True to look for episodes that may be copies of others.
-    pub alike: bool,
+    pub copy_candidates: bool,
 }
 
 /// The results of one scan.
@@ -93,7 +93,7 @@ pub struct Scored {
     pub quality: Option<QualityByCell>,
     /// The episodes of the first definitions that equal another one in all columns read, except for the id; empty
     /// unless requested.
-    pub alike: BTreeSet<String>,
+    pub copy_candidates: BTreeSet<String>,
 }
 
 /// Scores all episodes of some traces. The table does not depend on the number of threads, the order of files or the
@@ -129,10 +129,10 @@ pub fn score_all(
         let condition = quality.constants().filter(|name| !projection.constants.contains(name));
         projection.constants.extend(condition);
     }
-    projection.prints = outputs.alike;
+    projection.prints = outputs.copy_candidates;
     let mut headers: Vec<Header> = definitions.iter().map(|definitions| header(definitions, outputs.labels)).collect();
     // The prints are sorted like a metric, and then taken out.
-    if let Some(first) = headers.first_mut().filter(|_| outputs.alike) {
+    if let Some(first) = headers.first_mut().filter(|_| outputs.copy_candidates) {
         first.metrics.push(String::new());
     }
     let mut found = timelines.as_ref().map(|_| Vec::new());
@@ -162,12 +162,13 @@ pub fn score_all(
     if let Some(exceeded) = exceeded {
         return Err(of_first(traces, exceeded.into()));
     }
-    let alike = tables.first_mut().filter(|_| outputs.alike).map(alike).unwrap_or_default();
-    Ok(Scored { tables, timelines: found.map(in_key_order), quality, alike })
+    let copy_candidates =
+        tables.first_mut().filter(|_| outputs.copy_candidates).map(copy_candidates).unwrap_or_default();
+    Ok(Scored { tables, timelines: found.map(in_key_order), quality, copy_candidates })
 }
 
 /// The episodes that share their print with another one. Takes the prints out of the table.
-fn alike(table: &mut EpisodeTable) -> BTreeSet<String> {
+fn copy_candidates(table: &mut EpisodeTable) -> BTreeSet<String> {
     let prints: Vec<i64> = table.metrics.pop().map(|prints| prints.iter().flatten().collect()).unwrap_or_default();
     let mut sorted = prints.clone();
     sorted.sort_unstable();

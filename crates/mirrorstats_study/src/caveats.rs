@@ -1,5 +1,4 @@
-//! What every answer says beside its numbers: the filter, the pooled cells, the lost episodes, the declared design, and
-//! departures from a registered plan.
+//! Caveats of answers: the filter, pooled cells, lost episodes, the declared design, departures from a registered plan.
 
 use mirrorstats_analysis::plan::departures::{Looks, departures};
 use mirrorstats_analysis::statistics::{Options, Selection};

@@ -18,12 +18,12 @@ pub(crate) struct Copies {
 /// The episodes that are copies of others; `None` without copies, and for scores, which have no steps to compare.
 pub(crate) fn copies(study: &Study, results: &Results) -> Result<Option<Copies>, StudyError> {
     let Ok(traces) = study.traces() else { return Ok(None) };
-    let mut alike = results.alike.clone();
-    if !alike.is_empty() {
+    let mut copy_candidates = results.copy_candidates.clone();
+    if !copy_candidates.is_empty() {
         let counted: HashSet<&str> = results.episodes.keys.iter().map(|key| key.episode_id).collect();
-        alike.retain(|id| counted.contains(id.as_str()));
+        copy_candidates.retain(|id| counted.contains(id.as_str()));
     }
-    let found = find(traces, &alike, study.threads)?;
+    let found = find(traces, &copy_candidates, study.threads)?;
     let named: Vec<String> = found.iter().take(NAMED).map(|it| named(&it.episode, &it.of)).collect();
     let rest = found.len().saturating_sub(NAMED);
     let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };

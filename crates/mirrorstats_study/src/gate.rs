@@ -70,7 +70,7 @@ pub fn leading_metric(study: &Study) -> Result<String, StudyError> {
 }
 
 fn gated(study: &Study, options: &GateOptions) -> Result<Results, StudyError> {
-    let results = study.scan(Outputs { losses: true, alike: true, ..Outputs::default() })?;
+    let results = study.scan(Outputs { losses: true, copy_candidates: true, ..Outputs::default() })?;
     let table = &results.episodes;
     study.check_filter(table.len())?;
     check_verdicts(table)?;

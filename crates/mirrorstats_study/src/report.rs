@@ -95,7 +95,8 @@ pub fn report(study: &Study, options: &ReportOptions) -> Result<Report, StudyErr
     // Small files first: a mistake in the style should not cost a scan of the traces.
     let style = Style::load(&options.style)?;
     let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
-    let outputs = Outputs { losses: true, quality: true, hashes: true, alike: true, ..Outputs::of_figures(figures) };
+    let outputs =
+        Outputs { losses: true, quality: true, hashes: true, copy_candidates: true, ..Outputs::of_figures(figures) };
     let grouped = study.grouped_with(outputs)?;
     let illustrations = options.figures.then(|| Illustrations::of(&grouped, &style, options.png)).transpose()?;
     let (tables, ranks) = grouped.tables(&style)?;

@@ -26,7 +26,7 @@ pub struct Outputs {
     /// The hashes of the inputs.
     pub hashes: bool,
     /// The episodes that may be copies of others.
-    pub alike: bool,
+    pub copy_candidates: bool,
 }
 
 impl Outputs {
@@ -55,13 +55,13 @@ pub struct Results {
     /// The inputs with their hashes; empty if not requested.
     pub inputs: Vec<bundle::InputFile>,
     /// The episodes that equal another one in all columns read, except for the id; empty if not requested.
-    pub alike: BTreeSet<String>,
+    pub copy_candidates: BTreeSet<String>,
 }
 
 impl Results {
     pub(crate) fn of(episodes: EpisodeTable) -> Self {
         let (timelines, outcomes, lost, quality) = (None, None, None, None);
-        Self { episodes, timelines, outcomes, lost, quality, inputs: Vec::new(), alike: BTreeSet::new() }
+        Self { episodes, timelines, outcomes, lost, quality, inputs: Vec::new(), copy_candidates: BTreeSet::new() }
     }
 
     /// The same results, with a non-default condition in the model's name: `model [condition]`.

@@ -105,16 +105,22 @@ impl Study {
         let reader = outputs.quality.then(|| QualityReader::of(traces)).or(statuses);
         let timelines = outputs.timelines || outputs.outcomes;
         let quality = reader.as_ref();
-        let wanted =
-            score_traces::Outputs { labels: &labels, timelines, quality, unchecked: &UNCHECKED, alike: outputs.alike };
+        let wanted = score_traces::Outputs {
+            labels: &labels,
+            timelines,
+            quality,
+            unchecked: &UNCHECKED,
+            copy_candidates: outputs.copy_candidates,
+        };
         let lost = if outputs.losses { lost_episodes(traces)? } else { None };
         let all: Vec<&Definitions> = std::iter::once(&definitions).chain(&lost).collect();
-        let Scored { tables, timelines, quality, alike } = score_traces::score_all(traces, &all, wanted, self.threads)?;
+        let Scored { tables, timelines, quality, copy_candidates } =
+            score_traces::score_all(traces, &all, wanted, self.threads)?;
         let mut tables = tables.into_iter();
         let episodes = tables.next().expect("a table per definitions");
         own_definitions::check(&definitions, traces, &episodes)?;
         let lost = tables.next().map(|table| ids(&table));
-        Ok(Results { timelines, lost, quality, alike, ..Results::of(episodes) })
+        Ok(Results { timelines, lost, quality, copy_candidates, ..Results::of(episodes) })
     }
 }
 

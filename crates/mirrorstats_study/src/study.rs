@@ -151,7 +151,7 @@ impl Study {
 
     /// The counted episodes and their cells, from a scan. Errors: as [`Study::cells`]; a filter that keeps no episode.
     pub fn grouped(&self) -> Result<Grouped<'_>, StudyError> {
-        self.grouped_with(Outputs { losses: true, alike: true, ..Outputs::default() })
+        self.grouped_with(Outputs { losses: true, copy_candidates: true, ..Outputs::default() })
     }
 
     pub(crate) fn grouped_with(&self, outputs: Outputs) -> Result<Grouped<'_>, StudyError> {

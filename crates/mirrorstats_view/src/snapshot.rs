@@ -294,7 +294,7 @@ impl Scored {
     fn of(options: &Options, inputs: Vec<Input>) -> Result<Self, ViewError> {
         let study = Self::study(options, inputs.clone(), options.question.clone())?;
         let places = episode_places(study.traces()?, options.threads)?;
-        let outputs = Outputs { losses: true, quality: true, alike: true, ..Outputs::default() };
+        let outputs = Outputs { losses: true, quality: true, copy_candidates: true, ..Outputs::default() };
         let results = study.scan(outputs)?;
         let rows = results.episodes.keys.iter().enumerate().map(|(at, key)| (key.episode_id.to_owned(), at)).collect();
         Ok(Self { study, results, rows, inputs, places })

@@ -245,7 +245,7 @@ fn check_rows(
         (found, colors, starts, prints, replies, rows)
     };
     let (mut ids, mut tally) = (SeenIds::default(), Tally::new(set.files()));
-    let mut alike = Alike::default();
+    let mut copy_candidates = CopyCandidates::default();
     pass(set.files(), &layout, threads, &work, |file, event| {
         let check = &mut checks[places[file]];
         match event {
@@ -256,7 +256,7 @@ fn check_rows(
             ScanEvent::Whole((found, colors, starts, prints, replies, (episodes, steps))) => {
                 tally.add(set.files(), file, colors);
                 if !prints.is_empty() {
-                    alike.add(file, prints, &starts);
+                    copy_candidates.add(file, prints, &starts);
                 }
                 check.file.episodes += episodes;
                 check.file.steps += steps;
@@ -266,7 +266,7 @@ fn check_rows(
         }
         Ok::<_, TraceError>(())
     })?;
-    for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, alike, threads)) {
+    for (file, finding) in tally.findings(set.files()).into_iter().chain(copied(set, copy_candidates, threads)) {
         checks[places[file]].findings.push(finding);
     }
     Ok(())
@@ -275,14 +275,14 @@ fn check_rows(
 /// The episodes whose rows may equal those of another one, with their files. Ids are stored together: one allocation for
 /// each made the check of 300,000 episodes twice as long.
 #[derive(Default)]
-struct Alike {
+struct CopyCandidates {
     prints: Vec<u64>,
     ids: LargeStringBuilder,
     /// The number of episodes up to the end of each file.
     ends: Vec<(usize, usize)>,
 }
 
-impl Alike {
+impl CopyCandidates {
     fn add(&mut self, file: usize, prints: Vec<u64>, starts: &[Start]) {
         self.prints.extend(prints);
         for start in starts {
@@ -302,8 +302,8 @@ impl Alike {
 }
 
 /// The copies, each with its file. Unreadable files have other findings.
-fn copied(set: &TraceSet, alike: Alike, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
-    let files = alike.episodes();
+fn copied(set: &TraceSet, copy_candidates: CopyCandidates, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
+    let files = copy_candidates.episodes();
     let found = copies(set, &files.keys().cloned().collect(), threads).unwrap_or_default();
     let finding = |Copied { episode, of }: Copied| {
         let file = files.get(&episode).copied()?;

@@ -140,7 +140,7 @@ fn scanned(snapshot: &Snapshot, scored: &Scored, filter: &Filter, part: Part) ->
     let question = Question { filter: condition, ..options.question.clone() };
     let study = Scored::study(options, scored.inputs.clone(), question)?;
     let figures = if part == Part::Figures { mirrorstats_figures::FigureName::ALL.as_slice() } else { &[] };
-    let outputs = Outputs { losses: true, alike: true, ..Outputs::of_figures(figures) };
+    let outputs = Outputs { losses: true, copy_candidates: true, ..Outputs::of_figures(figures) };
     Ok(overview(&study, study.scan(outputs)?, &options.style, part)?)
 }
 

@@ -272,8 +272,8 @@ fn check_rows(
     Ok(())
 }
 
-/// The episodes whose rows may equal those of another one, with their files. Ids are stored together: one allocation for
-/// each made the check of 300,000 episodes twice as long.
+/// The episodes whose rows may equal those of another one, with their files. Ids are stored together, because one
+/// allocation for each took memory and time: 132 MB for 300,000 episodes instead of 84.
 #[derive(Default)]
 struct CopyCandidates {
     prints: Vec<u64>,

@@ -358,7 +358,8 @@ fn each<T: ArrowPrimitiveType>(column: Option<&ArrayRef>, rows: Range<usize>, mu
     }
 }
 
-/// The nearest integer, halves away from zero. The function `round` and integers of 128 bits took two fifths of the time.
+/// The nearest integer, halves away from zero. The function `round` and integers of 128 bits took two fifths of
+/// the time.
 #[expect(clippy::cast_possible_truncation, reason = "a cost of a reply is far below 2^127 billionths")]
 fn rounded(value: f64) -> i128 {
     const EXACT: f64 = 4_503_599_627_370_496.0; // 2^52

@@ -28,7 +28,8 @@ pub(crate) fn order(keys: &EpisodeKeys) -> Option<Vec<u32>> {
 }
 
 /// Eight bytes of each text, after the bytes that all texts begin with. Texts are in their order, unless these are
-/// equal. Other programs repeat seeds and runs, so ids decide the order. Comparing the ids took a twentieth of a report.
+/// equal. Other programs repeat seeds and runs, so ids decide the order. Comparing the ids took a twentieth of
+/// a report.
 fn starts(texts: &LargeStringArray) -> Vec<u64> {
     let bytes = |at: usize| texts.value(at).as_bytes();
     let common = (1..texts.len())

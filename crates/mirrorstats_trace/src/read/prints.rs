@@ -1,8 +1,8 @@
 //! A number for the rows of an episode. Equal rows have equal numbers, in every form of a column, and in every run and
 //! on every machine. Different rows rarely have equal numbers.
 //!
-//! Each value is multiplied by a number of its row and its column, and the products are summed. For 14 million steps this
-//! took about 0.2 s of processor time. Cryptographic hashes of all rows took nine seconds.
+//! Each value is multiplied by a number of its row and its column, and the products are summed. For 14 million
+//! steps this took about 0.2 s of processor time. Cryptographic hashes of all rows took nine seconds.
 
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 # The commands of the README: `make demo`, `make test` and `make test-all`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test test-all check-default others fmt lint needed unit soak fuzz docs book end-to-end wheel test-wheel bless release-check check-lerobot recorded calibrate questions bench bench-import bench-scores bench-shape bench-world bench-agents bench-view instructions bless-instructions instruction-programs sheet
+.PHONY: demo test test-all check-default others fmt lint needed needed-others unit soak fuzz docs book end-to-end clients wheel test-wheel bless release-check check-lerobot recorded calibrate questions seeing bench bench-import bench-scores bench-shape bench-world bench-agents bench-view instructions bless-instructions instruction-programs sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -11,12 +11,7 @@ demo:
 test: fmt lint unit end-to-end
 
 ## The rest of what CI checks: programs of others, power cuts, the browser suite, long rounds, the book, the wheel.
-test-all: test check-default others docs test-wheel
-
-# Tests that take most of the time, by their modules: `make test` skips them, `make test-all` runs them.
-LONG = accessible:: calibration:: documented_command_lines faults:: foreign:: hostile:: html::address html::episodes \
-	html::figures html::pair html::results html::surroundings latex:: log::lengths on_cluster pairs:: people:: \
-	view::copy view::find view::first_screen view::labels view::live world::panes
+test-all: test check-default others clients docs test-wheel
 
 fmt:
 	cargo fmt --all --check
@@ -28,32 +23,33 @@ lint:
 
 # As most people build it.
 check-default:
-	cargo clippy --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats_view \
-		--exclude mirrorstats_sim --exclude mirrorstats_record --exclude mirrorstats_vlm --all-targets -- -D warnings
+	cargo check --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats_view \
+		--exclude mirrorstats_sim --exclude mirrorstats_record --exclude mirrorstats_vlm --all-targets
 
-# What the tests need, each script says what it cannot get.
+# What the tests of `make test` need; each script says what it cannot get.
 needed:
-	scripts/get-axe.sh
 	scripts/get-browser.sh
 	scripts/get-duckdb.sh
 	scripts/get-egl.sh
-	scripts/get-harnesses.sh
 	scripts/get-mujoco.sh
+
+# What the other tests need too.
+needed-others: needed
+	scripts/get-axe.sh
+	scripts/get-harnesses.sh
+	scripts/get-numpy.sh
 	scripts/get-spark.sh
 	scripts/get-tex.sh
 	scripts/get-writers.sh
 
-# The member `fuzz` replays its corpora; chosen together, both use one build of the program. Many tests wait for other
-# processes, so more tests run than there are processors.
-THREADS = RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$(( $$(getconf _NPROCESSORS_ONLN) * 3 / 2 ))}
 unit: needed
-	$(THREADS) cargo test --workspace --all-features --no-fail-fast -- $(addprefix --skip ,$(LONG))
+	scripts/test.sh short
 
-others: needed
-	$(THREADS) cargo test --workspace --all-features --no-fail-fast --lib --bins --tests -- $(LONG)
+others: needed-others
+	scripts/test.sh long
 
 ## The campaigns that are too long for CI, with their full numbers of rounds: benches/SOAK.md.
-soak: needed
+soak: needed-others
 	cargo test --workspace --all-features --no-fail-fast -- --ignored soak
 
 ## Every fuzz target guided by coverage, MINUTES in all; what is found is kept, and the exit code is not 0: benches/FUZZ.md.
@@ -72,20 +68,24 @@ book:
 end-to-end:
 	scripts/end-to-end.sh
 
+# Logs as MCAP's own packages read them, and requests as the providers' own client libraries send them.
+clients:
+	scripts/check-packages.sh
+
 ## The wheel for others: the command and the Python package, for every Linux with glibc 2.28 or newer. A long build.
 wheel:
 	scripts/wheel.sh
 
 # The package as its users have it, installed where there is no Rust; from the dependencies that the tests have compiled.
-test-wheel: needed
+test-wheel: needed-others
 	scripts/test-wheel.sh
 
 ## The checks before a release.
-release-check: needed
+release-check: needed-others
 	scripts/release-check.sh
 
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
-bless: needed
+bless: needed-others
 	MIRRORSTATS_WRITE_SCHEMAS=1 MIRRORSTATS_WRITE_REFERENCE=1 INSTA_UPDATE=always cargo test --workspace --all-features --no-fail-fast
 	scripts/python-types.py
 	cargo run --quiet -- report fixtures/paper --style paper --png --out reports/paper
@@ -109,6 +109,10 @@ check-lerobot:
 ## The four questions of the world for the scripted agents: reports/world/questions.md and dose-response.svg; long.
 questions:
 	scripts/world-questions.sh
+
+## The agents that see, from pixels through HTTP: reports/world/seeing.md; RUNS=2 is a quick look.
+seeing:
+	scripts/seeing.sh
 
 ## All that is measured beside models: scoring, then the world.
 bench: bench-scores bench-world
@@ -171,7 +175,10 @@ bench-import:
 bench-view:
 	scripts/bench/view.sh
 
-## The contact sheet of the five experiments anew.
+## The contact sheet of the five experiments anew, and the table of what agents see of themselves.
 sheet:
 	scripts/get-mujoco.sh
 	cargo run --quiet --features sim -- world sheet --out reports/world
+	cargo run --quiet --features sim -- world sheet --experiment examples/experiments/mirrors.toml --out target/sheet
+	cp target/sheet/sheet.png docs/images/mirrors.png
+	cargo run --quiet --features sim -- world visibility "$$(cargo run --quiet --features sim -- experiments show | cut -d' ' -f1 | paste -sd,)" > reports/world/visibility.md

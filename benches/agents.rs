@@ -191,7 +191,7 @@ impl Progress for Quiet {
 fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> f64 {
     let subject = Subject::for_model(player.model());
     let store = Store::new(
-        FolderLock::take(&folder.join("runs")).unwrap(),
+        Arc::new(FolderLock::take(&folder.join("runs")).unwrap()),
         subject.clone(),
         metadata::Recordings::new(&[Experiment::E5], config, player, None, None),
     );
@@ -199,7 +199,7 @@ fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: No
     let keys: Vec<Key> = plan.keys();
     let stop = AtomicBool::new(false);
     let in_flight = NonZeroUsize::new(IN_FLIGHT).unwrap();
-    let settings = Settings { threads, in_flight, frames: true, log: true, max_unusable: None };
+    let settings = Settings { threads, in_flight, frames: true, log: true, casts: true, max_unusable: None };
     let (store, subject) = (&store, &subject);
     let recording =
         Recording { config, player, turn: &|_| Turn::Now, subject, store, progress: &Quiet, stop: &stop, settings };

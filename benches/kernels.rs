@@ -106,7 +106,7 @@ fn kernels(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(STEPS as u64));
     let mut bench = |name: &str, definitions: &Definitions| {
         let plan = PhysicalPlan::of(&[&definitions.plan]);
-        let score = || plan.evaluate(black_box(&sample.batch())).unwrap().scores(&plan.scores()[0]).unwrap();
+        let score = || plan.evaluate(black_box(&sample.batch())).unwrap().scores(&plan.scores[0]).unwrap();
         group.bench_function(name, |bencher| bencher.iter(score));
     };
     for (name, expression) in EXPRESSIONS {
@@ -120,7 +120,7 @@ fn table(criterion: &mut Criterion) {
     let sample = Sample::new();
     let definitions = Definitions::load("paper", &schema_columns()).unwrap();
     let plan = PhysicalPlan::of(&[&definitions.plan]);
-    let scores = plan.evaluate(&sample.batch()).unwrap().scores(&plan.scores()[0]).unwrap();
+    let scores = plan.evaluate(&sample.batch()).unwrap().scores(&plan.scores[0]).unwrap();
     let metrics = definitions.plan.outputs.iter().map(|output| output.name.clone()).collect();
     let header = Header { catalog: definitions.catalog.clone(), labels: Vec::new(), metrics };
     let mut group = criterion.benchmark_group("table");

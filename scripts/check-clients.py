@@ -96,7 +96,7 @@ def refused(call):
 
 def by_openai(origin, body, limit):
     system, user = body["messages"]
-    image, text = user["content"]
+    text, image = user["content"]
     schema = body["response_format"]["json_schema"]["schema"]
     client = openai.OpenAI(api_key=KEY, base_url=f"{origin}/v1", max_retries=0)
     return refused(
@@ -107,8 +107,8 @@ def by_openai(origin, body, limit):
                 {
                     "role": "user",
                     "content": [
-                        {"type": "image_url", "image_url": {"url": image["image_url"]["url"]}},
                         {"type": "text", "text": text["text"]},
+                        {"type": "image_url", "image_url": {"url": image["image_url"]["url"]}},
                     ],
                 },
             ],
@@ -125,7 +125,7 @@ def by_openai(origin, body, limit):
 
 def by_google(origin, body):
     types = google.genai.types
-    image, text = body["contents"][0]["parts"]
+    text, image = body["contents"][0]["parts"]
     client = google.genai.Client(
         api_key=KEY, vertexai=False, http_options=types.HttpOptions(base_url=origin, api_version="v1")
     )
@@ -133,7 +133,7 @@ def by_google(origin, body):
     return refused(
         lambda: client.models.generate_content(
             model=MODEL,
-            contents=[types.Part.from_bytes(data=png, mime_type="image/png"), text["text"]],
+            contents=[text["text"], types.Part.from_bytes(data=png, mime_type="image/png")],
             config=types.GenerateContentConfig(
                 system_instruction=body["systemInstruction"]["parts"][0]["text"],
                 temperature=TEMPERATURE,
@@ -147,24 +147,24 @@ def by_google(origin, body):
 
 
 def by_anthropic(origin, body):
-    image, text = body["messages"][0]["content"]
+    text, image = body["messages"][0]["content"]
     client = anthropic.Anthropic(api_key=KEY, base_url=origin, max_retries=0)
     return refused(
         lambda: client.messages.create(
             model=MODEL,
             max_tokens=MAX_OUTPUT_TOKENS,
-            # The library has no argument of that name any more; this is its way for fields that it does not know.
-            extra_body={"temperature": TEMPERATURE},
+            # A model that thinks takes no temperature.
+            thinking={"type": "adaptive"},
             system=body["system"],
             messages=[
                 {
                     "role": "user",
                     "content": [
+                        {"type": "text", "text": text["text"]},
                         {
                             "type": "image",
                             "source": {"type": "base64", "media_type": "image/png", "data": image["source"]["data"]},
                         },
-                        {"type": "text", "text": text["text"]},
                     ],
                 }
             ],

@@ -2,6 +2,7 @@
 """Writes python/mirrorstats/types.py: the shapes of Python's answers, from schemas/. `--check` only looks whether it is current."""
 
 import json
+import re
 import pathlib
 import sys
 
@@ -125,7 +126,10 @@ def written():
     for name, shape, names in objects:
         lines += typed_dict(name, shape, names)
     done = {name for name, *_ in objects}
-    lines += ["\n"] + [f"{name} = {kind(shape, names)}" for name, (shape, names) in known if name not in done]
+    others = {name: kind(shape, names) for name, (shape, names) in known if name not in done}
+    # An alias is evaluated where it is written, so those that name another one follow it.
+    names_another = lambda name: any(re.search(rf"\b{other}\b", others[name]) for other in others)
+    lines += ["\n"] + [f"{name} = {others[name]}" for name in sorted(others, key=lambda name: (names_another(name), name))]
     lines.append("\nif TYPE_CHECKING:")
     for answer, (document, names) in documents.items():
         lines += keys(answer, document, names)

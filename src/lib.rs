@@ -106,5 +106,5 @@ pub use mirrorstats_study::report::{Report, ReportOptions, report};
 pub use mirrorstats_study::rescore::{RescoreRequest, Rescored};
 pub use mirrorstats_study::results::{Outputs, Results};
 pub use mirrorstats_study::statistics::statistics;
-pub use mirrorstats_study::{Study, StudyError};
+pub use mirrorstats_study::{ErrorKind, Study, StudyError};
 pub use mirrorstats_tables::Table;

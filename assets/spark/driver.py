@@ -112,7 +112,7 @@ def score(spark, request):
         raise Refusal(rule={"fault": found, "faults": checked["faults"]})
     table = typed(spark.sql(request["statement"]), request)
     if request["folder"] is None:
-        episodes = collect(table, request["table"])
+        episodes = collect(table, request)
     else:
         table.write.mode("errorifexists").parquet(request["folder"])
         written = spark.read.option("recursiveFileLookup", "true").schema(table.schema).parquet(literal(request["folder"]))
@@ -192,11 +192,13 @@ def typed(table, request):
     return table.select(*columns)
 
 
-def collect(table, path):
+def collect(table, request):
+    """A line per episode: its five keys, the list of its metrics, the list of its labels."""
+    metrics = 5 + sum(kind in ("bigint", "double") for _, kind in request["results"])
     episodes = 0
-    with open(path, "w", encoding="utf-8") as file:
+    with open(request["table"], "w", encoding="utf-8") as file:
         for row in table.toLocalIterator():
-            json.dump(list(row), file)
+            json.dump([*row[:5], list(row[5:metrics]), list(row[metrics:])], file)
             file.write("\n")
             episodes += 1
     return episodes

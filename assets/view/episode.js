@@ -15,11 +15,11 @@ const WORDS = [["view_description", "What it says it sees"], ["reasoning", "Reas
 const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 const TRUTH = ["mirror_visible", "mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_mark_px", "mark_color", "bumped", "cube_distance", "target_distance", "pose_x", "pose_y", "pose_yaw"];
 
-/** The log's map of the room; empty if there is none. */
+/** The map of the room, from the log or a replay; empty if there is neither. */
 export const askMap = (id) => ask("map", new URLSearchParams({ id })).catch(() => EMPTY);
 
 /** The frame and the map of a step, as far as they exist; `show(t)` draws it, `ready` waits briefly for the map. */
-export function sight(episode, asked = episode.log ? askMap(episode.id) : Promise.resolve(EMPTY)) {
+export function sight(episode, asked = episode.log || episode.rendered ? askMap(episode.id) : Promise.resolve(EMPTY)) {
   const image = make("img", { class: "frame", alt: "", width: 640, height: 480 });
   const shown = make("figure", { class: "sight", hidden: !episode.frames }, image);
   const map = make("figure", { class: "above" });
@@ -181,7 +181,7 @@ export async function episodePage(content, study) {
   }
   const limit = (t) => Math.min(episode.length, Math.max(1, Math.round(t) || 1));
   let t = limit(query().has("t") ? Number(query().get("t")) : episode.running ? episode.length : (episode.verdict?.t ?? decidedAt(episode) ?? 1));
-  const { element, legend, ready, show } = sight(episode, episode.log ? asked : Promise.resolve(EMPTY));
+  const { element, legend, ready, show } = sight(episode, episode.log || episode.rendered ? asked : Promise.resolve(EMPTY));
   show(t);
   const panel = make("section", { class: "panel", tabindex: 0, "aria-label": "Reply and truth of the step" });
   const clock = make("output", { class: "clock" });

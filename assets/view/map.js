@@ -1,11 +1,11 @@
-// The room from above: the program's shapes from the log, the path so far, and the heading.
+// The room from above: the program's shapes, the path so far, the heading, and the cone of view.
 import { draw, make } from "./dom.js";
 import { numbersOf } from "./values.js";
 
 const REACH = 1.2;
-const KINDS = [["self", "itself"], ["other", "another body"], ["mirror", "mirror"], ["cube", "cube"]];
+const KINDS = [["self", "itself"], ["other", "another body"], ["mirror", "mirror"], ["cube", "cube"], ["wall", "wall"]];
 
-const kindOf = (name) => (name.startsWith("pane") ? "mirror" : /^agent0/.test(name) ? "self" : /^agent/.test(name) ? "other" : /^cube/.test(name) ? "cube" : "room");
+const kindOf = (name) => (name.startsWith("pane") ? "mirror" : /^agent0/.test(name) ? "self" : /^agent/.test(name) ? "other" : /^cube/.test(name) ? "cube" : /^wall/.test(name) ? "wall" : "room");
 
 /** The shapes of an answer, converted to metres: name, paint, height, radius and corners come in centimetres. */
 function unpacked({ names, paints, shapes, still, steps, every }) {
@@ -27,7 +27,7 @@ function bounds(shapes, path) {
   const reach = (list) => list.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
   const [[left, right], [low, high]] = [reach(points.map(([x]) => x)), reach(points.map(([, y]) => y))];
   const margin = shapes.length > 0 ? 0.05 * Math.max(right - left, high - low, 1) : REACH;
-  return { left: left - margin, width: right - left + 2 * margin, top: high + margin, height: high - low + 2 * margin };
+  return { left: left - margin, width: right - left + 2 * margin, top: high + margin, height: high - low + 2 * margin, inset: shapes.length > 0 ? margin : 0 };
 }
 
 function drawn({ name, kind, paint, radius, outline }) {
@@ -38,8 +38,23 @@ function drawn({ name, kind, paint, radius, outline }) {
   return draw("polygon", { ...attributes, points: outline.map(([x, y]) => `${x},${-y}`).join(" ") }, title);
 }
 
+/** Half of the horizontal field of view, radians; null if the trace does not have it. */
+function halfAngle(view) {
+  if (!view || !(view.fov_y > 0 && view.fov_y < 180)) return null;
+  return Math.atan(Math.tan((view.fov_y * Math.PI) / 360) * (view.width / view.height));
+}
+
+/** The part of the room in the field of view; the inner picture ends at the walls. */
+function cone({ left, width, top, height, inset }, x, y, angle, half) {
+  const reach = width + height;
+  const end = (turn) => `${x + reach * Math.cos(angle + turn)} ${-(y + reach * Math.sin(angle + turn))}`;
+  const path = draw("path", { class: "cone", d: `M ${x} ${-y} L ${end(half)} A ${reach} ${reach} 0 0 1 ${end(-half)} Z` });
+  const room = { x: left + inset, y: -top + inset, width: width - 2 * inset, height: height - 2 * inset };
+  return draw("svg", { ...room, viewBox: `${room.x} ${room.y} ${room.width} ${room.height}` }, path);
+}
+
 /** The legend of a map's shapes and lines. */
-function legendOf({ all, every }) {
+function legendOf({ all, every }, half) {
   const items = KINDS.filter(([kind]) => all.some((shape) => shape.kind === kind)).map(([kind, words]) => {
     const patch = make("i", { class: `key ${kind}`, "aria-hidden": "true" });
     if (kind === "self" || kind === "other") {
@@ -49,7 +64,8 @@ function legendOf({ all, every }) {
     return make("li", {}, patch, words);
   });
   const way = make("li", {}, make("i", { class: "key way", "aria-hidden": "true" }), "way so far, and where it looks");
-  return [...items, way, every > 1 ? make("li", {}, `bodies of one step in ${every}`) : null].filter((item) => item !== null);
+  const seen = half === null ? null : make("li", {}, make("i", { class: "key cone", "aria-hidden": "true" }), `field of view, ${Math.round((360 * half) / Math.PI)} degrees`);
+  return [...items, way, seen, every > 1 ? make("li", {}, `bodies of one step in ${every}`) : null].filter((item) => item !== null);
 }
 
 /** A map of an episode; `show(t)` draws a step. */
@@ -60,9 +76,11 @@ export function mapOf(episode, map) {
   const path = xs.map((x, at) => [x, ys[at]]).filter(([x, y]) => x !== null && y !== null && y !== undefined);
   const picture = draw("svg", { class: "map", role: "img", "aria-label": "The room from above" });
   if (path.length === 0 && room.all.length === 0) return { picture: null, legend: [], show: () => {} };
-  const { left, width, top, height } = bounds(room.all, path);
+  const limits = bounds(room.all, path);
+  const { left, width, top, height } = limits;
   picture.setAttribute("viewBox", `${left} ${-top} ${width} ${height}`);
   const unit = Math.max(width, height) / 100;
+  const half = halfAngle(episode.view);
   const show = (t) => {
     const shapes = room.at(t).map(drawn);
     const way = draw("polyline", { class: "way", points: path.slice(0, t).map(([x, y]) => `${x},${-y}`).join(" "), "stroke-width": unit * 0.6 });
@@ -71,11 +89,12 @@ export function mapOf(episode, map) {
     if (typeof x === "number" && typeof y === "number") {
       if (typeof yaw === "number") {
         const angle = (yaw * Math.PI) / 180;
+        if (half !== null) parts.push(cone(limits, x, y, angle, half));
         parts.push(draw("line", { class: "heading", x1: x, y1: -y, x2: x + REACH * Math.cos(angle), y2: -(y + REACH * Math.sin(angle)), "stroke-width": unit * 0.8 }));
       }
       parts.push(draw("circle", { class: "here", cx: x, cy: -y, r: unit * 1.4, "stroke-width": unit * 0.5 }));
     }
     picture.replaceChildren(...parts);
   };
-  return { picture, legend: legendOf(room), show };
+  return { picture, legend: legendOf(room, half), show };
 }

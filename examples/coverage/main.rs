@@ -2,6 +2,7 @@
 //!
 //! `cargo run --release --example coverage > benches/COVERAGE.md`; seeded, the same bytes on every machine.
 
+mod durations;
 mod errors;
 mod intervals;
 mod looks;
@@ -34,6 +35,7 @@ fn main() {
     looks::singles();
     looks::pairs();
     units::repeats();
+    durations::unequal();
 }
 
 fn heading(title: &str, note: &str, columns: &[&str]) {

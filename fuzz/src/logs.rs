@@ -8,6 +8,7 @@ use mirrorstats_log::assemble;
 use mirrorstats_log::recover::{Recovered, recover_from};
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows::EpisodeRows;
 use mirrorstats_trace::validate::validate;
 use mirrorstats_trace::write::OptionalColumns;
 use mirrorstats_trace::write::merge;
@@ -29,7 +30,7 @@ pub fn recover(data: &[u8]) {
     let rows = found.episodes.iter().map(|episode| merge::rows(episode, &columns));
     let Ok(rows) = rows.collect::<Result<Vec<_>, _>>() else { return };
     let steps: usize = found.episodes.iter().map(|episode| episode.steps.len()).sum();
-    assert_eq!(rows.iter().map(merge::EpisodeRows::len).sum::<usize>(), steps);
+    assert_eq!(rows.iter().map(EpisodeRows::len).sum::<usize>(), steps);
     let out = scratch::path("recovered.parquet");
     if rows.is_empty() || merge::write(&out, found.recording.as_ref(), &rows).is_err() {
         return;

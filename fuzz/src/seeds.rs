@@ -261,7 +261,7 @@ fn journal() -> Vec<u8> {
     let mut lines = Vec::new();
     for (t, body) in (1..).zip(bodies()) {
         let question = format!("q{t}");
-        let (question_of, at_most) = (question.clone(), Some([100, 50]));
+        let (question_of, at_most) = (question.clone(), [100, 50]);
         let request = Entry::Request { t, attempt: 1, question: question_of, frame: "f".into(), at_most };
         let failure = Entry::Failure {
             t,

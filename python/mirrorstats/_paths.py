@@ -41,6 +41,12 @@ class Spool:
             file.write(content)
         return path
 
+    def clear(self) -> None:
+        """Removes the folder."""
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
     def new(self, name: str) -> str:
         """The path of a file that does not exist yet."""
         (stem, ending), at = os.path.splitext(name), 1

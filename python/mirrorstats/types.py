@@ -32,6 +32,7 @@ class _Catalog(TypedDict):
 class Catalog(_Catalog, total=False):
     """A resolved definition file: its includes merged, in the order of definition."""
     domain: Optional[str]
+    column: dict[str, DecimalColumn]
     factor: dict[str, Factor]
 
 
@@ -44,13 +45,31 @@ class CellChange(TypedDict):
     mean_change: Optional[float]
 
 
+class _CellDesign(TypedDict):
+    experiment: str
+    model: str
+    episodes: int
+    lost: int
+    scenes: int
+    shared_scenes: int
+    most_repeats: int
+    seeds: int
+    unfinished: Optional[int]
+    unfinished_steps: Optional[list[int]]
+
+
+class CellDesign(_CellDesign, total=False):
+    """The episodes of one cell."""
+    condition: Optional[str]
+
+
 class _CellRow(TypedDict):
     key: dict[str, KeyValue]
     metric: str
     kind: Literal["rate", "quantity"]
     episodes: int
     n: int
-    sum: int
+    sum: Decimal
     mean: Optional[float]
     se: Optional[float]
     intervals: Intervals
@@ -59,6 +78,8 @@ class _CellRow(TypedDict):
 
 class CellRow(_CellRow, total=False):
     """One cell: the episodes of one group under one metric."""
+    units: Optional[Units]
+    unit_mean: Optional[float]
     lost: Optional[int]
     unusable_replies: Optional[int]
 
@@ -80,6 +101,8 @@ class _ChanceRow(TypedDict):
 class ChanceRow(_ChanceRow, total=False):
     """One rate against one level."""
     condition: Optional[str]
+    strategy: Optional[str]
+    unit_mean: Optional[float]
     units: Optional[Units]
     losses: Optional[LossCases]
 
@@ -149,9 +172,12 @@ class _Contrast(TypedDict):
 class Contrast(_Contrast, total=False):
     """The difference of a model's mean between two experiments, by pairs if their scenes agree."""
     condition: Optional[str]
+    unit_means: Optional[list[float]]
     repeat_se: Optional[float]
+    p_error: Optional[float]
     units: Optional[Units]
     losses: Optional[LossCases]
+    selected: Optional[str]
     incomparable: Optional[str]
 
 
@@ -173,6 +199,14 @@ class CorrectRow(TypedDict):
     withheld: Optional[Withheld]
 
 
+class DecimalColumn(TypedDict):
+    """A column of floats that are rounded to some digits after the point."""
+    type: Literal["bool", "int", "float", "text"]
+    constant: bool
+    decimals: int
+    unit: str
+
+
 class DefinitionsName(TypedDict):
     """The definitions behind some scores."""
     name: str
@@ -185,6 +219,19 @@ class Design(TypedDict):
     cluster: Optional[Literal["seed"]]
 
 
+class DesignAudit(TypedDict):
+    """The design of a study: its cells, and what limits comparisons."""
+    cells: list[CellDesign]
+    findings: list[DesignFinding]
+
+
+class DesignFinding(TypedDict):
+    """One limit of the design."""
+    check: Literal["copies", "losses", "replies", "origins", "mixture", "scenes", "repetitions", "units", "seeds", "budgets", "drivers"]
+    finding: str
+    touches: list[Literal["levels", "models", "experiments"]]
+
+
 class Detectable(TypedDict):
     """The smallest difference of two rates that an exact test of n pairs, or of n episodes on each side, could have shown. In the most favourable case: all discordant pairs point the same way, or one side has no success. Else more is needed."""
     n: int
@@ -194,12 +241,16 @@ class Detectable(TypedDict):
     likely: Optional[float]
 
 
-class Dose(TypedDict):
-    """A rate at one dose."""
+class _Dose(TypedDict):
     dose: float
     experiment: str
     successes: int
     n: int
+
+
+class Dose(_Dose, total=False):
+    """A rate at one dose."""
+    unit_mean: Optional[float]
 
 
 class _DurationRow(TypedDict):
@@ -233,7 +284,7 @@ class EpisodeName(TypedDict):
 class _Experiment(TypedDict):
     title: str
     order: int
-    chance: dict[str, Optional[Ratio]]
+    chance: dict[str, Optional[Chance]]
     reference: dict[str, list[Ratio]]
 
 
@@ -338,12 +389,16 @@ class GateCell(_GateCell, total=False):
     units: Optional[Units]
 
 
-class GateSide(TypedDict):
-    """The episodes of one side of a cell."""
+class _GateSide(TypedDict):
     n: int
     successes: Optional[int]
     mean: Optional[float]
     lost: int
+
+
+class GateSide(_GateSide, total=False):
+    """The episodes of one side of a cell."""
+    unit_mean: Optional[float]
 
 
 class ImprovementRow(TypedDict):
@@ -451,6 +506,7 @@ class _Metric(TypedDict):
 
 class Metric(_Metric, total=False):
     """One metric, as defined."""
+    decimals: int
     measures: Optional[Literal["rate", "duration", "count", "fraction"]]
     range: Optional[ValueRange]
     finished: Optional[str]
@@ -460,7 +516,7 @@ class Metric(_Metric, total=False):
 class MetricEvidence(TypedDict):
     """One metric of one episode."""
     metric: str
-    value: Optional[int]
+    value: Optional[Decimal]
     timesteps: list[int]
     facts: list[Fact]
 
@@ -469,8 +525,8 @@ class Numbers(TypedDict):
     """The exact numbers of a cell."""
     episodes: int
     n: int
-    sum: int
-    sum_sq: int
+    sum: Decimal
+    sum_sq: Decimal
     mean: Optional[float]
     se: Optional[float]
 
@@ -494,10 +550,12 @@ class _OverallRow(TypedDict):
     mid_p: Optional[float]
     p_adjusted: Optional[float]
     separated: bool
+    is_crossed: bool
 
 
 class OverallRow(_OverallRow, total=False):
     """Two models under one rate, over all experiments that both have."""
+    opposite: list[str]
     losses: Optional[LossCases]
 
 
@@ -541,8 +599,8 @@ class Pair3(TypedDict):
 
 class Pair4(TypedDict):
     """A value of the scoring before, and the one after."""
-    before: Optional[int]
-    after: Optional[int]
+    before: Optional[Decimal]
+    after: Optional[Decimal]
 
 
 class Pair5(TypedDict):
@@ -572,9 +630,12 @@ class _PairTest(TypedDict):
 
 class PairTest(_PairTest, total=False):
     """One model against another."""
+    unit_means: Optional[list[float]]
     repeat_se: Optional[float]
+    p_error: Optional[float]
     units: Optional[Units]
     losses: Optional[LossCases]
+    selected: Optional[str]
     incomparable: Optional[str]
 
 
@@ -589,7 +650,7 @@ class Pairs(TypedDict):
 class Played(TypedDict):
     """An episode of one side."""
     episode_id: str
-    value: int
+    value: Decimal
     timesteps: Optional[list[int]]
 
 
@@ -755,10 +816,12 @@ class ValueRange(TypedDict, total=False):
     most: Optional[int]
 
 
+Decimal = float
 Intervals = dict[str, Any]
 KeyValue = Optional[Union[int, str]]
 Ratio = str
 Withheld = dict[str, Any]
+Chance = Union[Literal["none"], Ratio, dict[str, Ratio]]
 
 if TYPE_CHECKING:
 
@@ -867,6 +930,8 @@ if TYPE_CHECKING:
         def __getitem__(self, key: Literal["departures"], /) -> Optional[list[str]]: ...
         @overload
         def __getitem__(self, key: Literal["not_comparable"], /) -> list[SettingApart]: ...
+        @overload
+        def __getitem__(self, key: Literal["audit"], /) -> DesignAudit: ...
         @overload
         def __getitem__(self, key: Literal["design"], /) -> Design: ...
         @overload

@@ -6,7 +6,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
 
-use mirrorstats::cli;
+use mirrorstats::cli::{self, CommandLine};
 use mirrorstats_import::Text;
 use mirrorstats_study::findings::{findings, findings_text};
 use mirrorstats_study::import::{ImportRequest, import};
@@ -20,7 +20,8 @@ use crate::error;
 /// Runs the command line with these arguments, the program's name first, and gives its exit code.
 #[pyfunction]
 pub fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| cli::run_to_code(arguments))
+    let line = CommandLine::new(arguments);
+    py.detach(|| line.exit_code(cli::caught(|| line.parse()?.run())))
 }
 
 /// All findings of traces.

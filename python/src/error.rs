@@ -4,46 +4,32 @@ use std::error::Error;
 use std::io;
 use std::path::Path;
 
-use mirrorstats::StudyError;
 use mirrorstats::cli::{ErrorAnswer, Failure};
+use mirrorstats::{ErrorKind, StudyError};
 use mirrorstats_import::{Fault, ImportError};
 use mirrorstats_toml_spec::{FaultRecord, Faults};
-use mirrorstats_trace::error::TraceError;
 use pyo3::prelude::*;
 
 /// The error of a study, in the class that shows what to change.
 pub fn of_study(error: StudyError) -> PyErr {
     let kind = kind(&error);
-    if let StudyError::Import(ImportError::Faults { faults, more }) = &error {
+    if let Some(ImportError::Faults { faults, more }) = error.cause() {
         return raised(kind, &in_rows(faults, *more), &[]);
     }
     of_failure(&error.into(), kind)
 }
 
 fn kind(error: &StudyError) -> &'static str {
-    use StudyError as E;
     if let Some(faults) = Faults::of(error) {
         let is_query = faults.records().iter().any(|fault| fault.file == "query");
         return if is_query { "QueryError" } else { "DefinitionError" };
     }
-    match error {
-        E::Polars(_) => "QueryError",
-        E::Definitions(_) | E::Style(_) | E::NotScored { .. } | E::DefinitionsElsewhere { .. } => "DefinitionError",
-        E::Metric(_)
-        | E::NoDirection { .. }
-        | E::NoTable { .. }
-        | E::Figure(_)
-        | E::Group(_)
-        | E::Evidence(_)
-        | E::Palette { .. }
-        | E::EmptyFilter { .. }
-        | E::NothingMoves { .. } => "ArgumentError",
-        E::Import(ImportError::Trace(TraceError::Write { .. }))
-        | E::Bundle(_)
-        | E::OntoItself { .. }
-        | E::Target(_)
-        | E::Encode(_) => "OutputError",
-        _ => "InputError",
+    match error.kind {
+        ErrorKind::Input => "InputError",
+        ErrorKind::Definitions => "DefinitionError",
+        ErrorKind::Argument => "ArgumentError",
+        ErrorKind::Query => "QueryError",
+        ErrorKind::Output => "OutputError",
     }
 }
 

@@ -6,6 +6,7 @@
 mod answer;
 mod columns;
 mod commands;
+mod environment;
 mod error;
 mod recording;
 mod shown;
@@ -21,6 +22,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<shown::ReportTable>()?;
     module.add_class::<shown::Figure>()?;
     module.add_class::<study::Study>()?;
+    module.add_class::<environment::Environment>()?;
+    module.add_function(wrap_pyfunction!(environment::experiments, module)?)?;
     module.add_function(wrap_pyfunction!(commands::run, module)?)?;
     module.add_function(wrap_pyfunction!(commands::validate, module)?)?;
     module.add_function(wrap_pyfunction!(commands::import_text, module)?)?;

@@ -51,7 +51,7 @@ impl PythonAgent {
     fn player(self, args: &RecordArgs, ending: &Ending) -> AnyPlayer {
         let Self { model, source, is_base64, is_lost, listeners } = self;
         let images = if is_base64 { Images::Base64 } else { Images::Path };
-        let (scratch, stop, ending) = (parts_of(args.out()), Arc::clone(&ending.stop), ending.clone());
+        let (scratch, stop, ending) = (parts_of(&args.out), Arc::clone(&ending.stop), ending.clone());
         let failed = move |py: Python<'_>, fault: PyErr| {
             let words = words(py, &fault);
             if !is_lost || !fault.is_instance_of::<PyException>(py) {

@@ -81,7 +81,7 @@ impl Study {
 
     #[getter]
     fn definitions(&self) -> String {
-        self.inner.definitions_name().to_string_lossy().into_owned()
+        self.inner.question.definitions_name().to_string_lossy().into_owned()
     }
 
     #[getter]

@@ -2,6 +2,7 @@
 
 import doctest
 import inspect
+import re
 import shutil
 
 import mirrorstats as ms
@@ -50,8 +51,26 @@ def test_every_page_with_python_is_run_below():
         "README.md": 1,
         "docs/how-to/python.md": 1,
         "docs/how-to/cluster.md": 1,
+        "docs/how-to/harness.md": 1,
         "docs/tutorials/own-agent.md": 1,
+        "docs/tutorials/train.md": 1,
     }
+
+
+def test_the_environment_of_the_page_plays(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    exec(compile(*blocks("docs/how-to/harness.md"), "harness.md", "exec"), {})
+    assert capsys.readouterr().out.endswith("0.0 True 0\n")
+    assert ms.open("runs").episodes.to_polars()["TTD"].to_list() == [1]
+
+
+def test_the_agent_of_the_tutorial_learns(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    exec(compile(*blocks("docs/tutorials/train.md"), "train.md", "exec"), {})
+    first, last = map(float, re.findall(r"0\.\d+", capsys.readouterr().out))
+    assert first < 0.6 and last > 0.85
+    scores = ms.open("runs").episodes.to_polars()
+    assert len(scores) == 21 and scores["WARRANTED"].sum() >= 5
 
 
 def test_the_agent_of_the_tutorial_is_recorded(tmp_path):

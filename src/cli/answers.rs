@@ -8,8 +8,8 @@ use super::commands::definitions::CheckAnswer;
 use super::commands::experiments::ExperimentsAnswer;
 use super::commands::study::report::ReportAnswer;
 use super::commands::table::rescore::RescoreAnswer;
-use super::commands::trace::recover::RecoverAnswer;
 use super::commands::trace::schema::Name;
+use mirrorstats_log::to_trace::RecoverAnswer;
 
 /// The schema of a printed answer: keys that are always present are required.
 pub fn printed_schema<T: JsonSchema>() -> Value {
@@ -33,9 +33,8 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
     ];
     #[cfg(feature = "sim")]
     schemas.extend([
-        ("record", printed_schema::<super::recording::RecordAnswer>()),
-        ("record-forecast", json!(schema_for!(super::recording::dry_run::ForecastAnswer))),
-        ("record-probe", json!(schema_for!(mirrorstats_vlm::probe::ProbeAnswer))),
+        ("record", printed_schema::<super::commands::record::answer::RecordAnswer>()),
+        ("record-forecast", json!(schema_for!(super::commands::record::forecast::ForecastAnswer))),
     ]);
     schemas
 }

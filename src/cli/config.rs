@@ -23,10 +23,6 @@ use mirrorstats_toml_spec::{Fault, Faults, Place, Source, parse_toml};
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file; if it is empty, no file is read.
 const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
-const OWN_PROMPT: &str = "a prompt belongs to an experiment: name a file with `experiment = \"own.toml\"`, and write into it \
-                          `[experiment.SHORT]` with `scenes = \"NAME\"` of the experiment to compare with and \
-                          `prompt = \"short\"`, a folder beside it; `mirrorstats experiments explain NAME --prompt` prints a \
-                          prompt to start from";
 const LARGEST: Limit = Limit::new("bytes of a configuration file", 1 << 20);
 
 /// A default of an option.
@@ -215,11 +211,7 @@ fn check(setting: &Setting, choices: &[Choice<'_>]) -> Result<(), Refusal> {
         let near = suggest::nearest(&setting.option, meant.iter().filter_map(|choice| choice.arg.get_long()));
         let of = setting.command.as_ref().map_or("any command".to_owned(), |command| format!("`{command}`"));
         let message = format!("no option `--{}` of {of}", visible(&setting.option));
-        let help = match setting.option.as_str() {
-            "prompt" | "prompts" | "system-prompt" | "user-prompt" => Some(OWN_PROMPT.to_owned()),
-            _ => near.map(|near| format!("did you mean `{near}`?")),
-        };
-        return Err(Refusal::Option(message, help));
+        return Err(Refusal::Option(message, near.map(|near| format!("did you mean `{near}`?"))));
     }
     taken.into_iter().try_for_each(|choice| takes(choice, setting))
 }

@@ -1,15 +1,4 @@
-//! The outcomes of a command and their exit codes.
-//!
-//! | code | meaning |
-//! |---|---|
-//! | 0 | done |
-//! | 1 | a requested check failed (`validate`, `compare`, `audit`, `verify`); `gate`: a regression |
-//! | 2 | bad usage, input or definition |
-//! | 3 | part of the input is lost (`recover`); the rest was saved |
-//! | 4 | `gate`: no regression, but some cells allow no verdict |
-//! | 5 | `gate`: no regression, but some cells are not comparable |
-//! | 101 | an internal error |
-//! | 130 | interrupted (`record`); finished work stays |
+//! The outcomes of a command and their exit codes; `docs/reference/environment.md` lists them.
 
 use std::error::Error;
 use std::ffi::OsString;
@@ -56,8 +45,6 @@ pub enum Failure {
     Output(io::Error),
     Input(Box<dyn Error + Send + Sync>),
     Panic(String),
-    /// A message with its own `error: ` and help.
-    Rendered(String),
     Faults(Faults),
 }
 
@@ -70,7 +57,7 @@ impl Failure {
         match self {
             Self::Output(error) => Some(error),
             Self::Input(error) => error.source(),
-            Self::Usage(_) | Self::Panic(_) | Self::Rendered(_) | Self::Faults(_) => None,
+            Self::Usage(_) | Self::Panic(_) | Self::Faults(_) => None,
         }
     }
 }
@@ -85,7 +72,6 @@ impl fmt::Display for Failure {
                 let help = "is there enough memory? If so, report the command and this message";
                 write!(f, "internal error: {fault}\n  help: {help}")
             }
-            Self::Rendered(text) => f.write_str(text),
             Self::Faults(faults) => faults.fmt(f),
         }
     }
@@ -163,6 +149,10 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
         Ok(Outcome::CannotSay) => 4,
         Ok(Outcome::NotComparable) => 5,
         Ok(Outcome::Interrupted) => 130,
+        // Help and version come here too; clap knows the stream of each.
+        Err(Failure::Usage(help)) if help.exit_code() == 0 => {
+            exit_code(help.print().map(|()| Outcome::Done).map_err(Failure::Output), format)
+        }
         // The reader of a pipe may stop early (`| head`): not an error.
         Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => 0,
         Err(failure) => {
@@ -188,7 +178,6 @@ fn words(failure: &Failure, colored: bool) -> String {
     let mut text = match failure {
         Failure::Usage(error) => visible_lines(&error.to_string()),
         Failure::Faults(faults) => faults.render(colored),
-        Failure::Rendered(text) => visible_lines(text),
         other => visible_lines(&format!("error: {other}")),
     };
     let mut cause = failure.source();

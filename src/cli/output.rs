@@ -106,7 +106,7 @@ pub fn create(path: &Path) -> Result<NewFile, Failure> {
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     replace::make_folder(folder).map_err(|error| {
         let words = "help: is there a file of that name, and is the folder above it writable?";
-        Failure::Rendered(format!("error: cannot make the folder `{}`: {error}\n  {words}", folder.display()))
+        Failure::input(format!("cannot make the folder `{}`: {error}\n  {words}", folder.display()))
     })
 }
 
@@ -125,8 +125,8 @@ pub fn unwritable(path: &Path, error: io::Error) -> Failure {
     if error.kind() == io::ErrorKind::BrokenPipe {
         return Failure::Output(error);
     }
-    Failure::Rendered(format!(
-        "error: cannot write `{}`: {error}\n  help: is the folder there and writable, and the disk not full?",
+    Failure::input(format!(
+        "cannot write `{}`: {error}\n  help: is the folder there and writable, and the disk not full?",
         path.display(),
     ))
 }

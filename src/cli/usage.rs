@@ -1,10 +1,17 @@
-//! The messages for a refused command line, besides clap's own.
+//! The messages for a refused command line, besides clap's own, and the features of this build.
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Error};
 
-use crate::cli::features;
 use mirrorstats_exact::suggest;
+
+/// Every feature, ordered by name; true if this build has it.
+const FEATURES: [(&str, bool); 4] = [
+    ("polars", cfg!(feature = "polars")),
+    ("raster", cfg!(feature = "raster")),
+    ("sim", cfg!(feature = "sim")),
+    ("view", cfg!(feature = "view")),
+];
 
 const OF_SIM: [&str; 2] = ["record", "world"];
 
@@ -54,9 +61,22 @@ fn of_feature(name: &str) -> Option<String> {
     (!cfg!(feature = "sim") && OF_SIM.contains(&name)).then(|| {
         format!(
             "`{name}` needs the feature `sim`, which this build lacks: build with `--features {}`",
-            features::with("sim")
+            features_with("sim")
         )
     })
+}
+
+/// The version, and the features of this build.
+pub fn long_version() -> String {
+    let present: Vec<&str> = FEATURES.into_iter().filter(|(_, is_there)| *is_there).map(|(name, _)| name).collect();
+    let features = if present.is_empty() { "none".to_owned() } else { present.join(", ") };
+    format!("{}\nfeatures: {features}", env!("CARGO_PKG_VERSION"))
+}
+
+/// The features for a build with one more: `polars,sim`. Features of every build are left out.
+fn features_with(name: &str) -> String {
+    let chosen = FEATURES.into_iter().filter(|(known, is_there)| (*is_there && *known != "raster") || *known == name);
+    chosen.map(|(known, _)| known).collect::<Vec<_>>().join(",")
 }
 
 fn similar(name: &str, command: &Command) -> String {
@@ -69,5 +89,17 @@ fn similar(name: &str, command: &Command) -> String {
     match near.and_then(|near| all.iter().find(|(last, _)| *last == near)) {
         Some((_, path)) => format!("a similar command exists: `{path}`"),
         None => "`mirrorstats help` lists the commands".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{features_with, long_version};
+
+    #[test]
+    fn a_missing_feature_is_added_to_the_present_ones() {
+        assert!(features_with("polars").split(',').any(|name| name == "polars"));
+        assert_eq!(features_with("polars").split(',').any(|name| name == "sim"), cfg!(feature = "sim"));
+        assert_eq!(long_version().contains("sim"), cfg!(feature = "sim"));
     }
 }

@@ -20,6 +20,7 @@ mod exec;
 mod function;
 #[path = "../harness/mod.rs"]
 mod harness;
+mod identifications;
 #[cfg(feature = "sim")]
 mod painted;
 #[cfg(feature = "sim")]

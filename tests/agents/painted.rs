@@ -10,8 +10,8 @@ use mirrorstats_agents::scripted::Scripted;
 use mirrorstats_agents::{Observation, Reply, Task};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::frame::Frame;
+use mirrorstats_trace::schema::colors::Color;
 
 const HALF: f64 = 4.0;
 const CEILING: f64 = 2.8;

@@ -7,12 +7,13 @@ use mirrorstats_agents::prompt::{self, Prompt};
 use mirrorstats_agents::{Observation, Past, Task};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::file;
+use mirrorstats_experiment::prompt::Templates;
 use mirrorstats_record::plan::Key;
 use mirrorstats_record::rollout;
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_sim::scene::Scene;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 
 fn task(experiment: Experiment, stated_color: Option<&str>) -> Task {
     Task { experiment, stated_color: stated_color.map(str::to_owned), step_budget: 100, seed: 1 }
@@ -98,7 +99,7 @@ fn the_five_experiments_use_the_two_prompts_of_the_paper() {
     let prompts = Experiment::PAPER.map(|experiment| experiment.prompt.clone());
     assert_eq!(prompts, ["cube-selection", "cube-selection", "cube-selection", "cube-selection", "exploration"]);
     for experiment in Experiment::PAPER {
-        assert_eq!(Prompt::for_experiment(&experiment).unwrap().hash(), experiment.prompt_hash, "{experiment:?}");
+        assert_eq!(experiment.templates().hash(), experiment.prompt_hash, "{experiment:?}");
     }
 }
 
@@ -128,8 +129,7 @@ fn the_history_is_one_line_for_any_thought() {
 
 #[test]
 fn prompts_have_distinct_hashes_and_actions_distinct_letters() {
-    let hashes = [Experiment::E1, Experiment::E5]
-        .map(|experiment| Prompt::for_experiment(&experiment).unwrap().hash().to_owned());
+    let hashes = [Experiment::E1, Experiment::E5].map(|experiment| experiment.templates().hash());
     assert_ne!(hashes[0], hashes[1]);
     for action in Action::ALL {
         assert_eq!(prompt::action(prompt::letter(action)), Some(action));
@@ -197,4 +197,18 @@ fn a_template_has_a_limit_of_work_and_length() {
     let told = rendered(nested(2, "{{ a0.thought }}"), &"long ".repeat(1000)).unwrap_err();
     assert!(told.contains("step 40: the template history.txt: expected at most 4194304 bytes"), "{told}");
     assert!(told.contains("MIRRORSTATS_BUDGET"), "{told}");
+}
+
+#[test]
+fn the_words_of_actions_are_those_of_the_prompts() {
+    let mut found = Vec::new();
+    for name in Templates::built_in_names() {
+        let (_, system) = Templates::built_in(name).unwrap().all.remove(0);
+        for (letter, words) in system.lines().filter_map(|line| line.trim().split_once(" = ")) {
+            let action = prompt::action(letter).unwrap_or_else(|| panic!("{name}: {letter} = {words}"));
+            assert_eq!(words, prompt::words(action), "{name}");
+            found.push(action);
+        }
+    }
+    assert!(Action::ALL.iter().all(|action| found.contains(action)), "{found:?}");
 }

@@ -126,6 +126,39 @@ fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
 }
 
 #[test]
+fn labels_of_a_coder_overrule_what_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    recorded(at);
+    run(at, &["report", "own.parquet", "--no-figures", "--out", "old"]).ends(0);
+    let rescored = |labels: &[(&str, u32, &str)], out: &str| {
+        let line = |(coder, step, label): &(&str, u32, &str)| {
+            format!("{}\n", json!({ "coder": coder, "episode_id": "E1/m/s1/r1", "step": step, "label": label }))
+        };
+        fs::write(at.join("labels.jsonl"), labels.iter().map(line).collect::<String>()).unwrap();
+        run(at, &["table", "rescore", "old", "--reparse", "--out", out])
+    };
+    let said = rescored(&[("ann", 1, "self_color_green"), ("bob", 4, "self_color_none")], "new").ends(0).stdout;
+    assert!(said.contains("green (label by ann)") && said.contains("-- (label by bob)"), "{said}");
+    let path = at.join("new-traces/own.parquet");
+    let steps = &traces::episodes(&path)[0].steps;
+    assert_eq!([0, 3].map(|at: usize| steps[at].self_color.as_deref()), [Some("green"), None]);
+    assert_eq!(traces::recording(&path)["labels_overrule"], true);
+    run(at, &["trace", "validate", "new-traces"]).ends(0);
+    for (labels, words) in [
+        (
+            vec![("ann", 1, "self_color_green"), ("bob", 1, "self_color_red")],
+            "E1/m/s1/r1, t = 1: expected coders who agree",
+        ),
+        (vec![("ann", 1, "self_color_mauve")], "expected `self_color_` and a colour of the palette"),
+        (vec![("ann", 2, "self_color_red")], "E1/m/s1/r1, t = 2: expected a step with a reply"),
+    ] {
+        let failed = rescored(&labels, "refused").ends(2);
+        assert!(failed.stderr.contains(words), "{}", failed.stderr);
+    }
+}
+
+#[test]
 fn traces_without_their_report_are_made_again() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -4,28 +4,11 @@ use mirrorstats_agents::reply::{self, Ending, Repair};
 use mirrorstats_agents::{Reply, Status};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::identification::normal_form;
 
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 
 fn read(raw: &str) -> Reply {
     reply::read(raw, &Experiment::E1, Ending::Whole)
-}
-
-#[test]
-fn identifications_have_one_normal_form() {
-    let mut wrong = Vec::new();
-    let mut cases = 0;
-    for line in include_str!("identifications.txt").lines().filter(|line| !line.starts_with('#')) {
-        let (text, expected) = line.rsplit_once(" => ").unwrap_or_else(|| panic!("no case: {line}"));
-        let expected = (expected != "-").then_some(expected);
-        cases += 1;
-        if normal_form(text) != expected {
-            wrong.push(format!("{text:?}: expected {expected:?}, found {:?}", normal_form(text)));
-        }
-    }
-    assert!(cases > 150, "only {cases} cases");
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
@@ -39,6 +22,13 @@ fn a_valid_reply_is_taken_as_it_is() {
 }
 
 #[test]
+fn an_unreadable_identification_is_a_fault_of_a_decision() {
+    let reading = read(&GOOD.replace("unknown", "Ich bin rot"));
+    assert_eq!((reading.status, reading.action, reading.self_color), (Status::Ok, Some(Action::TurnLeft), None));
+    assert_eq!(reading.fault.as_deref(), Some("unreadable identification: Ich bin rot"));
+}
+
+#[test]
 fn the_exploration_family_has_no_cube() {
     let without = GOOD.replace(r#" "selected_cube": "none","#, "");
     let reading = reply::read(&without, &Experiment::E5, Ending::Whole);
@@ -48,10 +38,10 @@ fn the_exploration_family_has_no_cube() {
 }
 
 #[test]
-fn a_cube_is_read_in_any_letter_case_and_white_space() {
+fn a_cube_in_other_letters_is_a_repair() {
     for (text, cube) in [
         ("Red", "red"),
-        ("RED", "red"),
+        ("RED.", "red"),
         (" red ", "red"),
         ("red\u{a0}", "red"),
         ("\\nred\\t", "red"),
@@ -59,8 +49,7 @@ fn a_cube_is_read_in_any_letter_case_and_white_space() {
         (" NONE", "none"),
     ] {
         let reading = read(&GOOD.replace("\"selected_cube\": \"none\"", &format!("\"selected_cube\": \"{text}\"")));
-        // Normalising the name is not a repair, as for attributions; the raw reply keeps the original.
-        assert_eq!((reading.status, reading.repairs), (Status::Ok, Vec::new()), "{text:?}");
+        assert_eq!((reading.status, reading.repairs), (Status::Repaired, vec![Repair::ValueSpelling]), "{text:?}");
         assert_eq!(reading.selected_cube.as_deref(), Some(cube), "{text:?}");
     }
     for text in ["unknown", "Mauve", "", "red cube", "r ed"] {
@@ -129,17 +118,17 @@ fn a_lone_surrogate_is_repaired_and_a_pair_is_kept() {
 
 #[test]
 fn an_action_in_other_letters_is_a_repair() {
-    use Repair::{ActionSpelling, CodeFence};
+    use Repair::{CodeFence, ValueSpelling};
     for (name, action) in
         [("A", Action::TurnLeft), (" a ", Action::TurnLeft), ("DONE", Action::Done), ("Done\\n", Action::Done)]
     {
         let raw = GOOD.replace("\"action\": \"a\"", &format!("\"action\": \"{name}\""));
         let reading = read(&raw);
-        assert_eq!((reading.status, reading.repairs), (Status::Repaired, vec![ActionSpelling]), "{name:?}");
+        assert_eq!((reading.status, reading.repairs), (Status::Repaired, vec![ValueSpelling]), "{name:?}");
         assert_eq!(reading.action, Some(action), "{name:?}");
     }
     let fenced = format!("```json\n{}\n```", GOOD.replace("\"a\"", "\"A\""));
-    assert_eq!(read(&fenced).repairs, [CodeFence, ActionSpelling]);
+    assert_eq!(read(&fenced).repairs, [CodeFence, ValueSpelling]);
     for name in ["left", "wa", "don e", "1", "\u{430}"] {
         let raw = GOOD.replace("\"action\": \"a\"", &format!("\"action\": \"{name}\""));
         assert_eq!((read(&raw).status, read(&raw).action), (Status::SchemaInvalid, None), "{name:?}");
@@ -173,13 +162,14 @@ fn raw_control_characters_and_comments_are_repairs() {
 
 #[test]
 fn a_call_of_a_function_with_the_right_arguments_is_a_repair() {
-    use Repair::{ActionSpelling, SurroundingText, ToolCall};
+    use Repair::{SurroundingText, ToolCall, ValueSpelling, Wrapper};
     let call = format!("{{\"name\": \"reply\", \"arguments\": {GOOD}}}");
     let cases = [
         (call.clone(), vec![ToolCall]),
         (call.replace("arguments", "parameters"), vec![ToolCall]),
         (format!("<tool_call>\n{call}\n</tool_call>"), vec![SurroundingText, ToolCall]),
-        (call.replace("\"a\"", "\"A\""), vec![ToolCall, ActionSpelling]),
+        (call.replace("\"a\"", "\"A\""), vec![ToolCall, ValueSpelling]),
+        (call.replace("\"name\": \"reply\", ", ""), vec![Wrapper]),
     ];
     for (raw, repairs) in cases {
         let reading = read(&raw);
@@ -187,7 +177,6 @@ fn a_call_of_a_function_with_the_right_arguments_is_a_repair() {
         assert_eq!((reading.words, reading.action), (read(GOOD).words, Some(Action::TurnLeft)), "{raw}");
     }
     for raw in [
-        call.replace("\"name\": \"reply\", ", ""),
         call.replace("\"reply\"", "1"),
         call.replace("\"action\"", "\"move\""),
         call.replace("\"action\"", "\"action\": \"w\", \"action\""),
@@ -273,7 +262,7 @@ fn an_invalid_reply_is_no_decision() {
         (&GOOD.replace("\"action\": \"a\"", "\"action\": \"a\", \"action\": \"w\""), Status::SchemaInvalid),
         (&GOOD.replace("\"none\"", "\"mauve\""), Status::SchemaInvalid),
         (&GOOD.replace("}\n", "").replace("\"unknown\"}", "\"unknown\", \"extra\": 1}"), Status::SchemaInvalid),
-        (&GOOD.replace("\"view-description\"", "\"view_description\""), Status::SchemaInvalid),
+        (&GOOD.replace("\"view-description\"", "\"view\""), Status::SchemaInvalid),
         ("", Status::Empty),
         (" \n\t", Status::Empty),
     ];
@@ -368,10 +357,15 @@ fn answers_of_an_experiment_are_read_by_their_types() {
             format!(r#"{{"view-description": "", "reasoning": "", "action": "w", "summary": "", "side": {side}}}"#);
         reply::read(&reply, &experiment, Ending::Whole)
     };
-    for (written, read) in [(r#"" LEFT ""#, Some("left")), (r#""unknown""#, Some("unknown")), (r#""""#, None)] {
+    for (written, status, read) in [
+        (r#""left""#, Status::Ok, Some("left")),
+        (r#"" LEFT. ""#, Status::Repaired, Some("left")),
+        (r#""unknown""#, Status::Ok, Some("unknown")),
+        (r#""""#, Status::Ok, None),
+    ] {
         let reading = with(written);
         let side = reading.answers.get("side").map(mirrorstats_trace::episodes::answers::Answered::text);
-        assert_eq!((reading.status, side.as_deref()), (Status::Ok, read), "{written}");
+        assert_eq!((reading.status, side.as_deref()), (status, read), "{written}");
     }
     for (written, fault) in [
         (r#""above""#, "\"side\" is \"above\", expected one of left, middle, right, unknown"),

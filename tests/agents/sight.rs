@@ -7,7 +7,7 @@ use mirrorstats_agents::perception::View;
 use mirrorstats_agents::perception::camera::{Place, Viewpoint};
 use mirrorstats_agents::scripted::knowledge::Knowledge;
 use mirrorstats_agents::scripted::room::WallSide;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use crate::painted::{Painted, pose};
 

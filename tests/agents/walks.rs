@@ -5,7 +5,7 @@ use mirrorstats_agents::scripted::Scripted;
 use mirrorstats_agents::{Reply, Task};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use crate::painted::{Painted, pose, task};
 

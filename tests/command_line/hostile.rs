@@ -136,7 +136,7 @@ const SHOWN: [&str; 27] = [
 ];
 
 /// Verbs whose output has no name of a trace.
-const NOT_SHOWN: [&str; 17] = [
+const NOT_SHOWN: [&str; 18] = [
     "plan",
     "record",
     "trace schema",
@@ -151,6 +151,7 @@ const NOT_SHOWN: [&str; 17] = [
     "style check",
     "world config",
     "world scene",
+    "world visibility",
     "world sheet",
     "setup completions",
     "setup man",

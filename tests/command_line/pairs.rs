@@ -249,6 +249,7 @@ const FILES: Walk = Walk {
         ("experiments check long.toml", Limit("bytes of an experiment file")),
         ("experiments explain long.toml", Limit("bytes of an experiment file")),
         ("world scene long.toml", Limit("bytes of an experiment file")),
+        ("world visibility long.toml", Limit("bytes of an experiment file")),
         ("world sheet --experiment long.toml", Limit("bytes of an experiment file")),
         ("trace recover bomb.mcap -o x.parquet", Answer),
         ("participants remove P01 .", Invalid),

@@ -19,7 +19,7 @@ use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
 /// Prefixes of command lines that are not run, and why.
-const NOT_RUN: [(&str, &str); 21] = [
+const NOT_RUN: [(&str, &str); 22] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
     ("scripts/get-mujoco.sh", "downloads a library; `make test` runs it before"),
@@ -36,10 +36,6 @@ const NOT_RUN: [(&str, &str); 21] = [
         "takes minutes; the calibration of agents does as much",
     ),
     (
-        "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --probe",
-        "needs a provider; `tests/agents` has servers in its place",
-    ),
-    (
         "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --max-cost",
         "needs a provider; `tests/agents` has servers in its place",
     ),
@@ -52,6 +48,8 @@ const NOT_RUN: [(&str, &str); 21] = [
         "mirrorstats record --agent vlm --model gemma-3-4b-it --base-url",
         "needs a provider; `tests/agents` has servers in its place",
     ),
+    ("python3 examples/agents/", "serves until it is ended, or trains for minutes; `tests/agents` starts the server"),
+    ("mirrorstats record --agent vlm --model seeing", "needs that server; `tests/agents` starts it"),
     ("mirrorstats record --agent human", "waits for people; `tests/reports/view` plays"),
     ("cargo run ", "builds the program"),
     ("mirrorstats record --agent oracle --experiment two-mirrors", "takes minutes; `make calibrate` does as much"),
@@ -164,7 +162,7 @@ fn output_of(command: &str, folder: &Path) -> String {
 fn lasting(output: &str) -> String {
     let progress = Regex::new(r"(?m)^[0-9]+ of [0-9]+ episodes?, .* a second.*\n").unwrap();
     let output = &progress.replace_all(output, "");
-    let took = Regex::new(r"in [0-9.]+ m?s( \([^)]*\))?").unwrap();
+    let took = Regex::new(r"in [0-9.]+ m?s\b( \([^)]*\))?").unwrap();
     let output = &Regex::new(r"\b[1-9A-HJ-NP-Za-km-z]{22}\b").unwrap().replace_all(output, "[an id]");
     took.replace_all(output, "in [a time]").into_owned()
 }

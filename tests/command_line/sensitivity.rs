@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use mirrorstats::Study;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_study::sensitivity::{Thresholds, sensitivity};
 use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::write::write_episodes;
@@ -125,7 +126,10 @@ fn compare(inputs: &str, px: u32) {
                 assert_eq!(found.is_none(), report.found.independent.contains(metric));
                 let Some(found) = found else { continue };
                 let se = moments.se(cells.catalog.metric[metric].se);
-                assert_eq!((found.n, found.sum, found.mean, found.se), (moments.n, moments.sum, moments.mean(), se));
+                assert_eq!(
+                    (found.n, found.sum, found.mean, found.se),
+                    (moments.n, Decimal::of_units(moments.sum, 0), moments.mean(), se)
+                );
                 compared += 1;
             }
         }

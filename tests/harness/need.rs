@@ -49,6 +49,14 @@ pub fn writers() -> PathBuf {
     packages
 }
 
+/// The folder of `numpy` from `scripts/get-numpy.sh`, beside cargo's output.
+pub fn numpy() -> PathBuf {
+    let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-numpy");
+    let is_there = packages.join("numpy").is_dir();
+    assert!(is_there, "no NumPy in {}: scripts/get-numpy.sh fetches it", packages.display());
+    packages
+}
+
 /// The folder of programs with importable logs from `scripts/get-harnesses.sh`, beside cargo's output.
 pub fn harnesses() -> PathBuf {
     let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-harnesses");

@@ -8,9 +8,9 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::DataType;
 use mirrorstats_trace::episodes::episode::{Episode, Step};
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::schema::RECORDING_KEY;
-use mirrorstats_trace::write::merge;
 use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -96,5 +96,5 @@ pub fn recording(path: &Path) -> Value {
 
 /// The episodes of a trace.
 pub fn episodes(path: &Path) -> Vec<Episode> {
-    merge::read(path).unwrap().iter().map(|rows| rows.episode().unwrap()).collect()
+    episode_rows::read(path).unwrap().iter().map(|rows| rows.episode().unwrap()).collect()
 }

@@ -19,7 +19,7 @@ const ALLOWED: [(&str, &str); 10] = [
     ("crates/mirrorstats_record/src/plan.rs", "an example"),
     ("src/cli/commands/trace/schema.rs", "two forms of a reply"),
     ("src/cli/commands/world/mod.rs", "which experiments are recorded by default"),
-    ("src/cli/commands/world/record.rs", "which experiments are recorded by default"),
+    ("src/cli/commands/record/mod.rs", "which experiments are recorded by default"),
     ("src/cli/help.rs", "examples"),
 ];
 

@@ -38,6 +38,7 @@ fn the_public_names_of_the_library_are_listed() {
     DiffRequest
     EpisodeKey
     EpisodeTable
+    ErrorKind
     Evidence
     Figure
     FigureFormat

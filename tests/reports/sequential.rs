@@ -4,6 +4,8 @@
 
 use indexmap::IndexMap;
 use mirrorstats_analysis::statistics::{Options, Sequential, Verdict};
+use mirrorstats_exact::chance::Chance;
+use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 
@@ -14,6 +16,7 @@ fn metric(kind: Kind) -> Metric {
         title: String::new(),
         kind,
         unit: String::new(),
+        decimals: 0,
         better: Better::Higher,
         section: String::new(),
         help: String::new(),
@@ -30,12 +33,13 @@ fn metric(kind: Kind) -> Metric {
 
 /// TSA, 1/3 by chance in E1 and without a level in E2; TTD, which is not a rate; MCR, a rate without a level.
 fn catalog() -> Catalog {
-    let chance = IndexMap::from([("TSA".to_owned(), Some("1/3".parse().unwrap()))]);
+    let chance = IndexMap::from([("TSA".to_owned(), "1/3".parse::<Ratio>().ok().map(Chance::Of))]);
     let experiment = |order, chance| {
         let (title, reference) = (String::new(), IndexMap::new());
         Experiment { title, order, chance, reference, is_declared: false, control: None }
     };
     Catalog {
+        columns: IndexMap::new(),
         name: "test".into(),
         domain: None,
         hash: "0".repeat(64),

@@ -1,6 +1,7 @@
 //! `stats` on episode tables with known answers.
 
 mod design;
+mod direction;
 mod durations;
 mod losses;
 mod units;
@@ -8,7 +9,9 @@ mod units;
 use indexmap::IndexMap;
 use mirrorstats_analysis::statistics::text::Length;
 use mirrorstats_analysis::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
+use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::moments::Moments;
+use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
 use mirrorstats_score::cells::interval::ranges;
 use mirrorstats_score::cells::{Cells, Group, KeyValue};
@@ -25,6 +28,7 @@ fn metric(kind: Kind, better: Better, when: Option<&str>) -> Metric {
         title: String::new(),
         kind,
         unit: "steps".into(),
+        decimals: 0,
         better,
         section: String::new(),
         help: String::new(),
@@ -43,7 +47,10 @@ fn experiment(order: i64, chance: &[(&str, &str)], reference: &[(&str, &[&str])]
     Experiment {
         title: String::new(),
         order,
-        chance: chance.iter().map(|(name, level)| ((*name).into(), Some(level.parse().unwrap()))).collect(),
+        chance: chance
+            .iter()
+            .map(|(name, level)| ((*name).into(), level.parse::<Ratio>().ok().map(Chance::Of)))
+            .collect(),
         reference: reference
             .iter()
             .map(|(name, levels)| ((*name).into(), levels.iter().map(|level| level.parse().unwrap()).collect()))
@@ -73,6 +80,7 @@ fn catalog() -> Catalog {
         ("E5".to_owned(), experiment(5, &[], &[("TSA", &["1/10", "1/11"])])),
     ]);
     Catalog {
+        columns: IndexMap::new(),
         name: "test".into(),
         domain: None,
         hash: "0".repeat(64),
@@ -118,7 +126,7 @@ fn cells(table: &EpisodeTable) -> Cells {
     for (row, key) in table.keys.iter().enumerate() {
         let key = vec![KeyValue::Text(key.experiment.to_owned()), KeyValue::Text(key.model.to_owned())];
         let moments = vec![Moments::default(); table.metrics.len()];
-        let group = groups.entry(key.clone()).or_insert(Group { key, episodes: 0, moments });
+        let group = groups.entry(key.clone()).or_insert(Group { key, episodes: 0, moments, repeats: false });
         group.episodes += 1;
         for (moments, column) in group.moments.iter_mut().zip(&table.metrics) {
             *moments = column.get(row).map_or(*moments, |value| moments.with(value).unwrap());
@@ -210,7 +218,7 @@ fn cells_carry_counts_and_the_intervals_of_their_kind() {
         found.cells.iter().find(is_it).unwrap()
     };
     let weak = cell("E1", "weak", "TSA");
-    assert_eq!((weak.sum, weak.n, weak.episodes), (5, 21, 21));
+    assert_eq!((weak.sum.units(), weak.n, weak.episodes), (5, 21, 21));
     let Intervals::Rate { wilson: Some(wilson), clopper_pearson: Some(exact), jeffreys: Some(jeffreys) } =
         weak.intervals
     else {

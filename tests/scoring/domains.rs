@@ -10,7 +10,7 @@ use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::vocabulary::trace_columns;
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::harness::files::repository;
 use crate::harness::logs;
@@ -18,26 +18,43 @@ use crate::harness::program::run;
 use crate::metamorphic::engines::{Engine, Rows, answers_about};
 
 /// Definitions, the traces for them, and the first metrics of each episode, worked out by hand.
-type Domain = (&'static str, fn(&Path) -> Vec<&'static str>, &'static [&'static str], [[Option<i64>; 3]; 4]);
+type Domain = (&'static str, fn(&Path) -> Vec<&'static str>, &'static [&'static str], [&'static [Option<i64>]; 4]);
 
-const DOMAINS: [Domain; 2] = [
+const DOMAINS: [Domain; 3] = [
     (
         "robots",
         robots,
         &["SUCCESS", "TIME", "DURATION"],
         // Solved at frame 2, never, at frame 0, and at frame 7; `t` counts from 1.
         [
-            [Some(1), Some(3), Some(3)],
-            [Some(0), None, Some(8)],
-            [Some(1), Some(1), Some(1)],
-            [Some(1), Some(8), Some(8)],
+            &[Some(1), Some(3), Some(3)],
+            &[Some(0), None, Some(8)],
+            &[Some(1), Some(1), Some(1)],
+            &[Some(1), Some(8), Some(8)],
+        ],
+    ),
+    (
+        "navigation",
+        navigation,
+        &["SUCCESS", "FINAL", "FORCE", "MEAN_FORCE", "PATH", "NEAR"],
+        // In units of the last digit: 0.30 m is 30, 1.2 N is 1200.
+        [
+            &[Some(1), Some(30), Some(1200), Some(501), Some(105), Some(1)],
+            &[Some(0), Some(-1), Some(-1), Some(-1), Some(0), Some(1)],
+            &[Some(0), Some(1235), None, None, Some(620), Some(0)],
+            &[Some(0), None, Some(3), Some(3), None, Some(0)],
         ],
     ),
     (
         "tools",
         tools,
         &["SUCCESS", "STEPS", "REPEATS"],
-        [[Some(1), Some(3), Some(1)], [Some(0), None, Some(1)], [Some(1), Some(3), Some(0)], [Some(0), None, Some(0)]],
+        [
+            &[Some(1), Some(3), Some(1)],
+            &[Some(0), None, Some(1)],
+            &[Some(1), Some(3), Some(0)],
+            &[Some(0), None, Some(0)],
+        ],
     ),
 ];
 
@@ -56,6 +73,28 @@ fn tools(folder: &Path) -> Vec<&'static str> {
                 "episode_id": format!("s{sample}"), "model": "m", "experiment": "task", "seed": 1, "run": sample + 1, "t": t,
                 "kind": if t == 1 { "model" } else { "tool" }, "tool": tool, "arguments": tool.map(|_| "{}"), "error": null,
                 "cost_micro_usd": 10 * t, "score": if sample % 2 == 0 { 1.0 } else { 0.0 }, "right_tool": "read",
+            });
+            writeln!(lines, "{step}").unwrap();
+        }
+    }
+    fs::write(folder.join("source"), lines).unwrap();
+    vec!["source", "--from", "jsonl"]
+}
+
+/// Each value is one whose double is not the decimal, or lies at a half of the last digit.
+fn navigation(folder: &Path) -> Vec<&'static str> {
+    let episodes: [&[(Value, Value)]; 4] = [
+        &[(json!(1.1), json!(0.3)), (json!(0.7), json!(0.0025)), (json!(0.3), json!(1.2))],
+        &[(json!(-0.005), json!(-0.0005))],
+        &[(json!(12.345), Value::Null)],
+        &[(Value::Null, json!(0.003))],
+    ];
+    let mut lines = String::new();
+    for (episode, steps) in episodes.iter().enumerate() {
+        for (t, (distance, force)) in (1..).zip(*steps) {
+            let step = json!({
+                "episode_id": format!("n{episode}"), "model": "m", "experiment": "kitchen", "seed": 1,
+                "run": episode + 1, "t": t, "distance": distance, "force": force, "success": episode == 0 && t == 3,
             });
             writeln!(lines, "{step}").unwrap();
         }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use mirrorstats::{ReportOptions, Study, StudyError};
+use mirrorstats_study::inputs::InputError;
 use mirrorstats_trace::write::OptionalColumns;
 
 use crate::harness::traces::{episode, write_trace};
@@ -29,9 +30,10 @@ fn after(change: impl Fn(&Path)) -> [Result<(), StudyError>; 3] {
 #[track_caller]
 fn assert_changed(answers: [Result<(), StudyError>; 3]) {
     for answer in answers {
-        match answer.unwrap_err() {
-            StudyError::Changed { name } => assert!(name.ends_with("b.parquet"), "{name}"),
-            other => panic!("{other}"),
+        let error = answer.unwrap_err();
+        match error.cause() {
+            Some(InputError::Changed { name }) => assert!(name.ends_with("b.parquet"), "{name}"),
+            _ => panic!("{error}"),
         }
     }
 }

@@ -86,12 +86,18 @@ fn a_spark_that_never_gets_to_the_driver_is_explained() {
 #[test]
 fn an_invalid_table_is_refused() {
     let done = answering(r#"{"done": {"episodes": 1}}"#);
-    for line in ["[1]", r#"["a", "m", "E1", 1, 1]"#, r#"["a", "m", null, 1, 1, 0, 1]"#, "no json"] {
+    for line in [
+        "[1]",
+        r#"["a", "m", "E1", 1, 1]"#,
+        r#"["a", "m", "E1", 1, 1, [0], []]"#,
+        r#"["a", "m", null, 1, 1, [0, 1], []]"#,
+        "no json",
+    ] {
         let folder = folder(&format!("{done}\necho '{line}' >\"$place/table.jsonl\""));
         let message = score(folder.path(), &["a.parquet", "--metrics", "TSA,TTD"]).refused();
         assert!(message.contains("cannot read what the driver"), "{message}");
     }
-    let folder = folder(&format!("{done}\necho '[\"a\", \"m\", \"E1\", 1, 2, null, 7]' >\"$place/table.jsonl\""));
+    let folder = folder(&format!("{done}\necho '[\"a\", \"m\", \"E1\", 1, 2, [null, 7], []]' >\"$place/table.jsonl\""));
     let scores = score(folder.path(), &["a.parquet", "--metrics", "TSA,TTD"]).done();
     assert_eq!(scores, "episode_id,model,experiment,seed,run,TSA,TTD\na,m,E1,1,2,,7\n");
 }

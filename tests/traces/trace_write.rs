@@ -4,8 +4,8 @@ use std::fs;
 
 use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows;
 use mirrorstats_trace::read::open::TraceSet;
-use mirrorstats_trace::write::merge;
 use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter, write_episodes};
 use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
@@ -106,7 +106,7 @@ fn repairs_have_a_column_where_replies_are_read() {
     writer.commit().unwrap();
     let set = TraceSet::open(&[Input::new(&path)]).unwrap();
     assert!(set.column_names().contains(&"reply_repair") && !set.column_names().contains(&"mark_color"));
-    let back: Vec<_> = merge::read(&path).unwrap().iter().map(|rows| rows.episode().unwrap()).collect();
+    let back: Vec<_> = episode_rows::read(&path).unwrap().iter().map(|rows| rows.episode().unwrap()).collect();
     assert_eq!(back, [repaired, episode("b", 1)]);
 }
 

@@ -17,8 +17,8 @@ use tokio::time::timeout;
 
 use super::exec::Images;
 use super::exec::conversation::Conversation;
-use super::exec::message::{EndMessage, Message, PROTOCOL};
-use super::exec::said::without;
+use super::exec::message::{Message, PROTOCOL};
+use super::reply::Ending;
 use super::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
 use mirrorstats_exact::hash;
@@ -73,9 +73,9 @@ impl Player for FunctionPlayer {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let Function { images, scratch, listeners, stop, .. } = &self.function;
-        let conversation = Conversation::new(task, episode_id, *images, scratch)?;
+        let conversation = Conversation::new(task, episode_id, *images, scratch, &self.secrets)?;
         let (questions, stop) = (questions(Arc::clone(listeners))?, Arc::clone(stop));
-        Ok(Box::new(FunctionAgent { conversation, questions, secrets: Arc::clone(&self.secrets), stop, steps: 0 }))
+        Ok(Box::new(FunctionAgent { conversation, questions, stop }))
     }
 
     fn waits(&self) -> bool {
@@ -83,7 +83,6 @@ impl Player for FunctionPlayer {
     }
 }
 
-/// A message and the channel for its reply.
 type Question = (Message, oneshot::Sender<Result<String, String>>);
 
 fn questions(listeners: Arc<Listeners>) -> Result<Sender<Question>, Lost> {
@@ -105,9 +104,7 @@ fn questions(listeners: Arc<Listeners>) -> Result<Sender<Question>, Lost> {
 struct FunctionAgent {
     conversation: Conversation,
     questions: Sender<Question>,
-    secrets: Arc<[Secret]>,
     stop: Arc<AtomicBool>,
-    steps: i32,
 }
 
 impl Agent for FunctionAgent {
@@ -116,44 +113,41 @@ impl Agent for FunctionAgent {
     }
 
     fn end(&mut self, reason: Ended) -> Farewell<'_> {
-        let end = Message::End(EndMessage { reason, steps: self.steps });
         Box::pin(async move {
             // The episode is committed: the function's response to its end changes nothing.
-            let _ = self.tell(end).await;
+            let _ = self.tell(self.conversation.end(reason)).await;
         })
     }
 }
 
 impl FunctionAgent {
     async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
-        self.steps = observation.t;
         let (task, question) = self.conversation.messages(observation)?;
         let start = Instant::now();
         if let Some(task) = task {
             self.tell(task).await?;
         }
         let text = self.tell(question).await?;
-        let usage = Usage::of_time(start.elapsed());
-        Ok(self.conversation.read(without(&self.secrets, &text), usage))
+        Ok(self.conversation.read(&text, Ending::Whole, Usage::of_time(start.elapsed())))
     }
 
     /// The reply to a message; a stopped recording ends the wait without losing the episode.
-    async fn tell(&mut self, message: Message) -> Result<String, Lost> {
+    async fn tell(&self, message: Message) -> Result<String, Lost> {
         let (reply, mut said) = oneshot::channel();
         // If the thread has ended, the question is dropped, which the receiver notices.
         let _ = self.questions.send((message, reply));
         loop {
             match timeout(GLANCE, &mut said).await {
-                Ok(Ok(said)) => return said.map_err(|fault| failed(&self.secrets, self.steps, &fault)),
-                Ok(Err(_)) => return Err(failed(&self.secrets, self.steps, "the function ended without a reply")),
+                Ok(Ok(said)) => return said.map_err(|fault| self.failed(&fault)),
+                Ok(Err(_)) => return Err(self.failed("the function ended without a reply")),
                 Err(_) if self.stop.load(Ordering::Relaxed) => return Err(Lost::by_stop()),
                 Err(_) => {}
             }
         }
     }
-}
 
-fn failed(secrets: &[Secret], step: i32, fault: &str) -> Lost {
-    let at = if step == 0 { String::new() } else { format!("step {step}: ") };
-    Lost::counted_as(Status::ServerError, without(secrets, &format!("{at}{fault}")))
+    fn failed(&self, fault: &str) -> Lost {
+        let cause = self.conversation.without_secrets(&format!("step {}: {fault}", self.conversation.steps));
+        Lost::counted_as(Status::ServerError, cause)
+    }
 }

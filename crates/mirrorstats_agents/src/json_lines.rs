@@ -28,7 +28,6 @@ pub fn line(object: &impl Serialize) -> serde_json::Result<Vec<u8>> {
     Ok(line)
 }
 
-/// Replaces the content of a file in one step.
 pub fn replace<T: Serialize>(path: &Path, objects: &[T]) -> io::Result<()> {
     let lines: Vec<Vec<u8>> = objects.iter().map(line).collect::<serde_json::Result<_>>()?;
     mirrorstats_exact::replace::replace(path, &lines.concat())

@@ -11,6 +11,8 @@
 pub mod exec;
 #[cfg(feature = "play")]
 pub mod function;
+#[cfg(feature = "play")]
+pub mod harness;
 #[cfg(all(feature = "play", feature = "view"))]
 pub mod human;
 #[cfg(feature = "play")]
@@ -38,7 +40,7 @@ use mirrorstats_exact::names;
 use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::answers::Answered;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 use reply::Repair;
 
 /// The task that an agent gets once, before the first step.
@@ -85,7 +87,7 @@ pub struct Past {
 }
 
 /// An agent's answer, and how it was obtained.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reply {
     pub status: Status,
     pub repairs: Vec<Repair>,
@@ -102,7 +104,6 @@ pub struct Reply {
     /// The answers that the experiment declares, by key; missing answers are absent.
     pub answers: Answers,
     pub words: Words,
-    /// The whole reply as received.
     pub raw: Option<String>,
     pub usage: Usage,
     /// The model's id as the provider returned it; `None` without a provider.
@@ -145,9 +146,10 @@ pub fn milliseconds(time: Duration) -> i32 {
 }
 
 /// The outcome of getting and reading a reply: the values of the trace's `reply_status` column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Status {
     /// Valid as it came.
+    #[default]
     Ok,
     /// Valid after a named repair.
     Repaired,
@@ -187,7 +189,6 @@ names!(Status {
 pub struct Lost {
     /// The status of the reply, if the failure is one of a reply.
     pub status: Option<Status>,
-    /// The failure, without any key.
     pub cause: String,
     /// The step that went wrong, if it precedes the one where the failure was noticed.
     pub step: Option<i32>,
@@ -241,26 +242,29 @@ pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// A decision that may take time: scripted agents are ready at once, others wait for a network or a program.
 pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
 
-/// The agent's work after its episode.
 pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
 
 pub trait Agent {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
 
-    /// The participant's code; `None` for other agents.
-    fn participant(&self) -> Option<&str> {
-        None
-    }
-
-    fn wants_practice(&self) -> bool {
-        false
-    }
-
-    fn practise(&mut self, _task: Option<Task>) {}
-
     fn end(&mut self, _ended: Ended) -> Farewell<'_> {
         Box::pin(std::future::ready(()))
     }
+
+    /// The person who decides; `None` for other agents.
+    fn person(&mut self) -> Option<&mut dyn Person> {
+        None
+    }
+}
+
+/// What only people need.
+pub trait Person {
+    fn code(&self) -> &str;
+
+    fn wants_practice(&self) -> bool;
+
+    /// Begins the practice with a task of its own, or ends it.
+    fn practise(&mut self, task: Option<Task>);
 }
 
 /// The ending of an episode.

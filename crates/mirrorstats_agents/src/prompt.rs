@@ -1,6 +1,6 @@
 //! The words around a frame, from the templates of an experiment's prompt.
 //!
-//! Rule: equal tasks and observations give equal words, and [`Prompt::hash`] changes with every edit of the templates.
+//! Rule: equal tasks and observations give equal words.
 
 use std::io;
 
@@ -21,7 +21,6 @@ const LONGEST: Limit = Limit::new("bytes of a prompt's text", 4 << 20);
 #[derive(Debug)]
 pub struct Prompt {
     experiment: Experiment,
-    hash: String,
 }
 
 /// The messages to a model besides the frame.
@@ -34,7 +33,7 @@ pub struct Rendered {
 
 impl Prompt {
     pub fn for_experiment(experiment: &Experiment) -> Result<Self, Error> {
-        let prompt = Self { experiment: experiment.clone(), hash: experiment.templates().hash() };
+        let prompt = Self { experiment: experiment.clone() };
         prompt.environment()?;
         Ok(prompt)
     }
@@ -48,11 +47,6 @@ impl Prompt {
             environment.add_template(name, source)?;
         }
         Ok(environment)
-    }
-
-    /// SHA-256 of the templates, 64 hexadecimal digits.
-    pub fn hash(&self) -> &str {
-        &self.hash
     }
 
     pub fn render(&self, task: &Task, observation: &Observation) -> Result<Rendered, Error> {
@@ -134,24 +128,31 @@ pub fn hashes() -> serde_json::Value {
     })
 }
 
-/// The prompt's letter or number for an action.
 pub const fn letter(action: Action) -> &'static str {
+    spoken(action)[0]
+}
+
+/// The words of the built-in prompts for an action.
+pub const fn words(action: Action) -> &'static str {
+    spoken(action)[1]
+}
+
+const fn spoken(action: Action) -> [&'static str; 2] {
     match action {
-        Action::MoveForward => "w",
-        Action::MoveBackward => "s",
-        Action::TurnLeft => "a",
-        Action::TurnRight => "d",
-        Action::Done => "done",
-        Action::HandUp => "1",
-        Action::HandDown => "2",
-        Action::HandLeft => "3",
-        Action::HandRight => "4",
-        Action::HandForward => "5",
-        Action::HandBackward => "6",
+        Action::MoveForward => ["w", "move forward"],
+        Action::MoveBackward => ["s", "move backward"],
+        Action::TurnLeft => ["a", "turn left by 30 degrees"],
+        Action::TurnRight => ["d", "turn right by 30 degrees"],
+        Action::Done => ["done", "task complete"],
+        Action::HandUp => ["1", "up"],
+        Action::HandDown => ["2", "down"],
+        Action::HandLeft => ["3", "left, as the image shows it"],
+        Action::HandRight => ["4", "right, as the image shows it"],
+        Action::HandForward => ["5", "forward, away from the camera"],
+        Action::HandBackward => ["6", "backward, towards the camera"],
     }
 }
 
-/// The action of a letter, spelled exactly as in the prompt.
 pub fn action(letter_of_action: &str) -> Option<Action> {
     Action::ALL.into_iter().find(|action| letter(*action) == letter_of_action)
 }

@@ -1,8 +1,8 @@
 //! Recorded replies parsed again by this program.
 //!
 //! Rule: recorded actions stay, since the world has reacted to them. An episode with a changed action diverges from the
-//! first such step on, and is listed. Replies that the provider refused stay unchanged, and so do truncated ones
-//! unless a whole object is in them.
+//! first such step on, and is listed. Labels `self_color_COLOUR` overrule attributions. Replies that the provider
+//! refused stay unchanged, and so do truncated ones unless a whole object is in them.
 
 use std::path::Path;
 
@@ -13,14 +13,20 @@ use serde_json::Value;
 use crate::reply::{self, Ending, Repair};
 use crate::{Reply, Status};
 use mirrorstats_experiment::{Experiment, Spec};
+use mirrorstats_trace::beside::ListError;
+use mirrorstats_trace::beside::labels::Labels;
 use mirrorstats_trace::episodes::answers::{Answered, columns_of};
 use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
-use mirrorstats_trace::episodes::identification::put_version;
+use mirrorstats_trace::episodes::identification::{UNREADABLE, put_version};
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows::{self, NotAnEpisode};
 use mirrorstats_trace::read::open::TraceFile;
-use mirrorstats_trace::write::merge::{self, NotAnEpisode};
+use mirrorstats_trace::schema::colors::Color;
 use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+
+/// Labels of steps that overrule their attributions begin so.
+const OVERRULES: &str = "self_color_";
 
 /// The changes by another reading of the same replies.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
@@ -48,6 +54,8 @@ pub struct Change {
     pub before: Option<String>,
     /// The value by this program; null without one.
     pub after: Option<String>,
+    /// The coder whose label decided; null if this program did.
+    pub coder: Option<String>,
 }
 
 /// The first step of an episode whose action would have been another one.
@@ -74,6 +82,12 @@ pub enum ReparseError {
          only recordings of agents that reply in words have them"
     )]
     NoReplies { file: String, found: String },
+    #[error(transparent)]
+    Labels(#[from] ListError),
+    #[error(
+        "{episode_id}, t = {t}: expected {expected}, found {found}\n  help: correct or remove the label in `labels.jsonl`"
+    )]
+    Label { episode_id: String, t: usize, expected: &'static str, found: String },
 }
 
 impl ReparseAnswer {
@@ -82,36 +96,52 @@ impl ReparseAnswer {
     pub fn reparse(inputs: &[Input], stage: &Path, folder: &Path) -> Result<(Self, Vec<Input>), ReparseError> {
         let mut answer = Self::default();
         let mut written = Vec::new();
+        let labels = Labels::beside(inputs)?;
         for input in inputs {
             let name = input.path.file_name().unwrap_or_default();
             let path = stage.join(name);
-            answer.add_trace(input, &path)?;
+            answer.add_trace(input, &path, &labels)?;
             written.push(Input { path, ..Input::new(folder.join(name)) });
         }
         answer.traces = written.iter().map(|input| input.name.clone()).collect();
         Ok((answer, written))
     }
 
-    fn add_trace(&mut self, input: &Input, target: &Path) -> Result<(), ReparseError> {
+    fn add_trace(&mut self, input: &Input, target: &Path, labels: &Labels) -> Result<(), ReparseError> {
         let (mut recording, experiment) = recipe(input)?;
         put_version(&mut recording);
+        if labels.words().iter().any(|word| word.starts_with(OVERRULES)) {
+            recording["labels_overrule"] = true.into();
+        }
         let columns = OptionalColumns::recorded(&recording);
         let mut writer = TraceWriter::create(target, &TraceMetadata { recording: Some(recording), columns })?;
-        for rows in merge::read(&input.path)? {
+        for rows in episode_rows::read(&input.path)? {
             let failed = |error| ReparseError::Episode { file: input.name.clone(), error };
             let mut episode = rows.episode().map_err(failed)?;
-            self.add_episode(&mut episode, &experiment);
+            self.add_episode(&mut episode, &experiment, labels)?;
             writer.write(&episode)?;
         }
         Ok(writer.commit()?)
     }
 
-    fn add_episode(&mut self, episode: &mut Episode, experiment: &Spec) {
+    fn add_episode(&mut self, episode: &mut Episode, experiment: &Spec, labels: &Labels) -> Result<(), ReparseError> {
         let id = episode.episode_id.clone();
         let mut has_diverged = false;
         for (at, step) in episode.steps.iter_mut().enumerate() {
-            let Some(reading) = read_again(step, experiment) else { continue };
+            let verdict = verdict(labels, &id, at + 1)?;
+            let Some(mut reading) = read_again(step, experiment) else {
+                if let Some((_, found)) = verdict {
+                    let (expected, found) = ("a step with a reply", format!("the label `{OVERRULES}{found}`"));
+                    return Err(ReparseError::Label { episode_id: id, t: at + 1, expected, found });
+                }
+                continue;
+            };
             self.replies += 1;
+            if let Some((_, color)) = verdict {
+                reading.self_color = (color != "none").then(|| color.to_owned());
+                // The coder has read what the rule could not.
+                reading.fault = reading.fault.filter(|fault| !fault.starts_with(UNREADABLE));
+            }
             if reading.action != step.action && !has_diverged {
                 has_diverged = true;
                 let [recorded, parsed] = [step.action, reading.action].map(|action| action.map(Action::name));
@@ -125,11 +155,31 @@ impl ReparseAnswer {
             reading.put(experiment, step);
             for ((column, before), (_, after)) in before.into_iter().zip(compared(step, experiment)) {
                 if before != after {
-                    self.changes.push(Change { episode_id: id.clone(), t: at + 1, column, before, after });
+                    let coder = verdict.filter(|_| column == "self_color").map(|(coder, _)| coder.to_owned());
+                    self.changes.push(Change { episode_id: id.clone(), t: at + 1, column, before, after, coder });
                 }
             }
         }
+        Ok(())
     }
+}
+
+/// The coder and the colour, `unknown` or `none` of a step's label that overrules its attribution.
+fn verdict<'l>(labels: &'l Labels, id: &str, t: usize) -> Result<Option<(&'l str, &'l str)>, ReparseError> {
+    let wrong = |expected, found| ReparseError::Label { episode_id: id.to_owned(), t, expected, found };
+    let of_step = labels.of_episode(id).filter(|mark| mark.step.is_some_and(|step| step as usize == t));
+    let mut decided: Option<(&str, &str)> = None;
+    for (coder, label) in of_step.filter_map(|mark| Some((mark.coder, mark.label?))) {
+        let Some(color) = label.strip_prefix(OVERRULES) else { continue };
+        if !["unknown", "none"].contains(&color) && Color::named(color).is_none() {
+            return Err(wrong("`self_color_` and a colour of the palette, `unknown` or `none`", format!("`{label}`")));
+        }
+        if let Some((other, before)) = decided.filter(|(_, before)| *before != color) {
+            return Err(wrong("coders who agree", format!("`{before}` by {other} and `{color}` by {coder}")));
+        }
+        decided = Some((coder, color));
+    }
+    Ok(decided)
 }
 
 fn recipe(input: &Input) -> Result<(Value, Experiment), ReparseError> {
@@ -155,7 +205,8 @@ fn read_again(step: &Step, experiment: &Spec) -> Option<Reply> {
         _ => Ending::Whole,
     };
     let reading = reply::read(step.extra.reply.as_deref()?, experiment, ending);
-    if status == Status::Truncated && reading.status == status {
+    // The text does not show a limit or reasoning either, and the recorded fault stays.
+    if matches!(status, Status::Truncated | Status::Empty) && reading.status == status {
         return None;
     }
     let repairs = step.extra.reply_repair.as_deref().unwrap_or_default();

@@ -16,7 +16,6 @@ const PLACEHOLDER: &str = "[key]";
 #[derive(Clone)]
 pub struct Secret {
     key: SecretString,
-    /// Every form of the key; `None` for an empty key.
     forms: Option<Regex>,
 }
 
@@ -44,7 +43,6 @@ impl Secret {
         Self { key: key.into(), forms }
     }
 
-    /// The text without any form of the key.
     pub fn without(&self, text: &str) -> String {
         match &self.forms {
             Some(forms) => forms.replace_all(text, PLACEHOLDER).into_owned(),
@@ -67,7 +65,6 @@ impl Secret {
     }
 }
 
-/// A pattern of all forms of a key.
 fn forms(key: &str) -> Option<Regex> {
     // A shorter encoded form may be part of an ordinary word.
     const SHORTEST: usize = 8;

@@ -6,22 +6,23 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::comparable::{Recorded, Varied, difference};
+use crate::comparable::{Budget, Recorded, Varied, difference, driver};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_metric::catalogs::catalog::{Better, Kind, Metric};
 use mirrorstats_metric::catalogs::relations::Relations;
 use mirrorstats_score::cells::interval;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
+use mirrorstats_statistics::comparisons::units::mean;
 use mirrorstats_statistics::design::{Cluster, Design};
 use mirrorstats_statistics::intervals::interval::Interval;
 
 const DEFAULT_CONDITION: &str = "default";
 
 /// The label of the scene: room, body, cubes, start.
-const SCENE: &str = "scene";
+pub(crate) const SCENE: &str = "scene";
 
-const PARTICIPANT: &str = "participant";
+pub(crate) const PARTICIPANT: &str = "participant";
 
 /// The unit of analysis: episodes within it depend on each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,30 +74,34 @@ pub(crate) struct Block<'a> {
     pub model: &'a str,
     /// The condition; `None` if all episodes of the table have the default one.
     pub condition: Option<&'a str>,
+    /// The side, if the table has several.
+    pub side: Option<&'a str>,
     rows: Vec<Range<usize>>,
     recorded: Recorded<'a>,
     moments: BTreeMap<&'a str, Moments>,
-    /// The number of lost episodes, which are not in the rows.
     pub lost: u64,
     /// True if any unit has several episodes.
     pub repeats: bool,
 }
 
 impl<'a> Study<'a> {
+    /// The blocks of a table; if its episodes have several sides, each side has blocks of its own.
     pub fn from_table(
         table: &'a EpisodeTable,
         design: Design,
         lost: Option<&LostCounts>,
+        sides: Option<&'a TextColumn>,
     ) -> Result<Self, MomentOverflow> {
         let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
         let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
         // A table is ordered by experiment, then by model.
-        for rows in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
+        for rows in runs(0..table.len(), |row| (table.keys.experiment.code(row), table.keys.model.code(row))) {
             let key = table.keys.get(rows.start);
             let of_experiment =
                 blocks.entry((table.catalog.experiment_rank(key.experiment), key.experiment)).or_default();
-            for (condition, rows) in by_condition(conditions, rows) {
-                of_experiment.push(Block::of(table, (key.experiment, key.model, condition), rows)?);
+            for ((condition, side), rows) in parts(conditions, sides, rows) {
+                let block = Block::of(table, (key.experiment, key.model, condition), rows)?;
+                of_experiment.push(Block { side, ..block });
             }
         }
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
@@ -106,7 +111,7 @@ impl<'a> Study<'a> {
         let mut study = Self { table, design, experiments, relations, pool: false, ranges };
         let of_block = |block: &Block| {
             let lost = lost.map_or(0, |lost| lost.of(block.experiment, block.model, block.condition));
-            (lost, study.has_repeats(block))
+            (lost, study.has_repeats(block.rows()))
         };
         let found: Vec<(u64, bool)> = study.blocks().map(of_block).collect();
         let blocks = study.experiments.iter_mut().flat_map(|experiment| &mut experiment.blocks);
@@ -117,6 +122,15 @@ impl<'a> Study<'a> {
     /// The differing setting of two blocks that the comparison does not vary; `None` if none is known.
     pub(crate) fn setting_between(&self, first: &Block, second: &Block, varied: Varied) -> Option<String> {
         difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
+    }
+
+    /// The difference between the drivers of two models; `None` if none is known.
+    pub(crate) fn driver_between(&self, first: &Block, second: &Block) -> Option<String> {
+        driver(&self.table.declared, [&first.recorded, &second.recorded])
+    }
+
+    pub(crate) fn recorded_budget(&self, block: &Block) -> Budget {
+        Budget::of(&self.table.declared, &block.recorded)
     }
 
     /// The same for two blocks of one study.
@@ -166,8 +180,30 @@ impl<'a> Study<'a> {
 
     /// The defined values of each unit of a block.
     pub(crate) fn by_unit(&self, block: &Block, value: impl Fn(usize) -> Option<i64>) -> BTreeMap<Unit, Moments> {
+        self.units_of(block.rows(), value)
+    }
+
+    /// The mean of a block as its tests take it: each unit counts once, however many episodes it has.
+    pub(crate) fn mean(&self, block: &Block, column: &MetricColumn) -> Option<f64> {
+        if !block.repeats {
+            return block.moments(column).mean();
+        }
+        self.unit_mean(block, |row| column.get(row))
+    }
+
+    /// The mean over units of the means of their values.
+    pub(crate) fn unit_mean(&self, block: &Block, value: impl Fn(usize) -> Option<i64>) -> Option<f64> {
+        let units: Vec<Moments> = self.by_unit(block, value).into_values().collect();
+        mean(&units)
+    }
+
+    pub(crate) fn units_of(
+        &self,
+        rows: impl Iterator<Item = usize>,
+        value: impl Fn(usize) -> Option<i64>,
+    ) -> BTreeMap<Unit, Moments> {
         let mut units: BTreeMap<Unit, Moments> = BTreeMap::new();
-        for (row, value) in block.rows().filter_map(|row| Some((row, value(row)?))) {
+        for (row, value) in rows.filter_map(|row| Some((row, value(row)?))) {
             let sum = units.entry(self.unit(row)).or_default();
             *sum = sum.with(value).expect("a part of a block that was summed whole");
         }
@@ -181,17 +217,18 @@ impl<'a> Study<'a> {
         defined.filter(|(unit, _)| seen.insert(*unit)).collect()
     }
 
-    fn has_repeats(&self, block: &Block) -> bool {
-        if !self.has_units() {
-            return false;
-        }
-        let units: BTreeSet<Unit> = block.rows().map(|row| self.unit(row)).collect();
-        units.len() < block.rows().count()
+    /// Returns true if a unit has several of these rows.
+    pub(crate) fn has_repeats(&self, mut rows: impl Iterator<Item = usize>) -> bool {
+        let mut units = BTreeSet::new();
+        self.has_units() && !rows.all(|row| units.insert(self.unit(row)))
     }
 
-    /// The name of a block's units, in the plural.
     pub(crate) fn unit_name(&self, block: &Block) -> &'static str {
-        match block.rows().next().map(|row| self.unit(row)) {
+        self.name_of_unit(block.rows().next())
+    }
+
+    pub(crate) fn name_of_unit(&self, row: Option<usize>) -> &'static str {
+        match row.map(|row| self.unit(row)) {
             Some(Unit::Seed(_)) => "seeds",
             Some(Unit::Participant(_)) => "participants",
             Some(Unit::Scene(_)) => "scenes",
@@ -203,7 +240,6 @@ impl<'a> Study<'a> {
         self.table.metric(metric)
     }
 
-    /// The metrics with values 0 and 1.
     pub fn rates(&self) -> impl Iterator<Item = &'a MetricColumn> {
         self.table.metrics.iter().filter(|column| self.kind(&column.name) == Kind::Rate)
     }
@@ -240,7 +276,7 @@ impl<'a> Block<'a> {
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
         let recorded = Recorded::of(table, rows.iter().cloned().flatten());
-        Ok(Self { experiment, model, condition, rows, recorded, moments, lost: 0, repeats: false })
+        Ok(Self { experiment, model, condition, side: None, rows, recorded, moments, lost: 0, repeats: false })
     }
 
     /// The name in comparisons: `model`, or `model [condition]` if there are several.
@@ -274,14 +310,24 @@ pub(crate) fn named(model: &str, condition: Option<&str>) -> String {
     condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
 }
 
-/// The rows of one model by condition, which is not part of a table's order.
-fn by_condition(conditions: Option<&TextColumn>, rows: Range<usize>) -> Vec<(Option<&str>, Vec<Range<usize>>)> {
-    let Some(conditions) = conditions else { return vec![(None, vec![rows])] };
-    let mut parts: BTreeMap<&str, Vec<Range<usize>>> = BTreeMap::new();
-    for run in runs(rows, |row| conditions.get(row).unwrap_or(DEFAULT_CONDITION)) {
-        parts.entry(conditions.get(run.start).unwrap_or(DEFAULT_CONDITION)).or_default().push(run);
+/// The condition and the side of a block.
+type Part<'a> = (Option<&'a str>, Option<&'a str>);
+
+/// The rows of one model by condition and side, which are not part of a table's order.
+fn parts<'a>(
+    conditions: Option<&'a TextColumn>,
+    sides: Option<&'a TextColumn>,
+    rows: Range<usize>,
+) -> BTreeMap<Part<'a>, Vec<Range<usize>>> {
+    let part = |row: usize| {
+        let condition = conditions.map(|conditions| conditions.get(row).unwrap_or(DEFAULT_CONDITION));
+        (condition, sides.and_then(|sides| sides.get(row)))
+    };
+    let mut parts = BTreeMap::<_, Vec<Range<usize>>>::new();
+    for run in runs(rows, part) {
+        parts.entry(part(run.start)).or_default().push(run);
     }
-    parts.into_iter().map(|(condition, rows)| (Some(condition), rows)).collect()
+    parts
 }
 
 fn runs<K: PartialEq>(rows: Range<usize>, key: impl Fn(usize) -> K) -> Vec<Range<usize>> {

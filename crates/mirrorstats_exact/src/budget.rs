@@ -67,7 +67,6 @@ impl Budget {
     }
 }
 
-/// The error if an input asks for more work than a limit allows.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected {}, found more; {}", self.expected(), Self::help())]
 pub struct Exceeded {

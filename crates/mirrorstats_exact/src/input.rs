@@ -6,6 +6,8 @@
 
 use std::fs::{File, Metadata};
 use std::io::{self, BufRead, BufReader, Read};
+#[cfg(unix)]
+use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
 use super::budget::Limit;
@@ -106,40 +108,24 @@ fn check(about: &Metadata) -> io::Result<()> {
     if about.is_file() {
         return Ok(());
     }
-    let found = what_it_is(about);
+    #[cfg(unix)]
+    let found = match about.file_type() {
+        kind if FileTypeExt::is_fifo(&kind) => "a named pipe",
+        kind if FileTypeExt::is_socket(&kind) => "a socket",
+        _ => "a device",
+    };
+    #[cfg(not(unix))]
+    let found = "a device";
     let words = format!("expected a file, found {found}; copy what it gives into a file, and name that");
     Err(io::Error::new(io::ErrorKind::InvalidInput, words))
 }
 
-#[cfg(unix)]
-fn what_it_is(about: &Metadata) -> &'static str {
-    use std::os::unix::fs::FileTypeExt as _;
-    let kind = about.file_type();
-    if kind.is_fifo() {
-        "a named pipe"
-    } else if kind.is_socket() {
-        "a socket"
-    } else {
-        "a device"
-    }
-}
-
-#[cfg(not(unix))]
-fn what_it_is(_: &Metadata) -> &'static str {
-    "a device"
-}
-
 /// Opens without blocking if a pipe has replaced the file since the check.
-#[cfg(target_os = "linux")]
 fn open_without_waiting(path: &Path) -> io::Result<File> {
-    use std::os::unix::fs::OpenOptionsExt as _;
-    let flags = rustix::fs::OFlags::NONBLOCK.bits().cast_signed();
-    std::fs::OpenOptions::new().read(true).custom_flags(flags).open(path)
-}
-
-#[cfg(not(target_os = "linux"))]
-fn open_without_waiting(path: &Path) -> io::Result<File> {
-    File::open(path)
+    let mut options = std::fs::OpenOptions::new();
+    #[cfg(target_os = "linux")]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, rustix::fs::OFlags::NONBLOCK.bits().cast_signed());
+    options.read(true).open(path)
 }
 
 #[cfg(test)]

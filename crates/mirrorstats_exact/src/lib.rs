@@ -15,6 +15,7 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod budget;
+pub mod chance;
 pub mod escape;
 pub mod format;
 pub mod hash;

@@ -8,14 +8,11 @@ use serde::{Deserialize, Serialize};
 /// Addition is exact in any order; 128 bits hold 2^64 values of 32 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Moments {
-    /// The number of defined values.
     pub n: u64,
     pub sum: i128,
-    /// The sum of their squares.
     pub sum_sq: i128,
 }
 
-/// The error if moments exceed 128 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the sum of squares exceeds 128 bits; use a smaller unit in the metric's definition")]
 pub struct MomentOverflow;
@@ -31,7 +28,6 @@ impl Moments {
         })
     }
 
-    /// Adds some zeros and ones.
     pub fn with_truths(self, zeros: usize, ones: usize) -> Result<Self, MomentOverflow> {
         let (n, sum) = ((zeros + ones) as u64, ones as i128);
         Ok(Self {

@@ -5,7 +5,6 @@
 macro_rules! names {
     ($type:ident { $($variant:ident: $name:literal),+ $(,)? }) => {
         impl $type {
-            /// All variants, in order.
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
 
             pub const fn name(self) -> &'static str {
@@ -14,7 +13,6 @@ macro_rules! names {
                 }
             }
 
-            /// The variant with this name, as `name` writes it.
             pub fn named(name: &str) -> Option<Self> {
                 Self::ALL.into_iter().find(|one| one.name() == name)
             }

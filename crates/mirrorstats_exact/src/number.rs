@@ -8,11 +8,15 @@ use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
 /// The most digits after the point that are worth printing.
 pub(crate) const MOST_PLACES: u32 = 9;
 
-/// A number as printed: `units / 10^places`. Zero has no sign, so `-0.00` cannot be printed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// A number as printed: `units / 10^places`. Zero has no sign, so `-0.00` cannot be printed. In JSON it is a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, JsonSchema)]
+#[schemars(with = "f64")]
 pub struct Decimal {
     units: i128,
     places: u32,
@@ -23,7 +27,6 @@ impl Decimal {
         Self { units: 0, places }
     }
 
-    /// `units / 10^places`.
     pub fn of_units(units: i128, places: u32) -> Self {
         Self { units, places }
     }
@@ -35,6 +38,24 @@ impl Decimal {
 
     pub fn places(self) -> u32 {
         self.places
+    }
+
+    /// The same number with this many digits; `None` if that would drop digits other than zeros.
+    pub fn with_places(self, places: u32) -> Option<Self> {
+        let units = if let Some(more) = places.checked_sub(self.places) {
+            self.units.checked_mul(power_of_ten(more)?)?
+        } else {
+            let divisor = power_of_ten(self.places - places)?;
+            (self.units % divisor == 0).then_some(self.units / divisor)?
+        };
+        Some(Self { units, places })
+    }
+
+    /// The same number without zeros at its end, so that equal numbers are equal values.
+    #[must_use]
+    pub fn shortest(self) -> Self {
+        let shorter = self.places.checked_sub(1).and_then(|places| self.with_places(places));
+        shorter.map_or(self, Self::shortest)
     }
 
     /// `above / below` rounded once, ties to even. `None` if `below` is not positive, or if 128 bits do not suffice.
@@ -123,7 +144,31 @@ impl fmt::Display for Decimal {
     }
 }
 
-/// The error for a text that is not a plain decimal number.
+impl Serialize for Decimal {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match (self.places, self.to_string().parse()) {
+            (0, _) => serializer.serialize_i128(self.units),
+            (_, Ok(nearest)) => serializer.serialize_f64(nearest),
+            (_, Err(error)) => Err(serde::ser::Error::custom(format!("{self}: {error}"))),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Decimal {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Number {
+            Int(i64),
+            Float(f64),
+        }
+        match Number::deserialize(deserializer)? {
+            Number::Int(units) => Ok(Self::of_units(units.into(), 0)),
+            Number::Float(value) => value.to_string().parse().map_err(serde::de::Error::custom),
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected a plain decimal number such as `0.57`")]
 pub struct NotADecimal;

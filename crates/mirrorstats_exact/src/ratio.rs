@@ -6,7 +6,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::number::gcd;
+use crate::number::{Decimal, gcd};
 
 /// A fraction of two integers in lowest terms; written `1/3` in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -56,8 +56,8 @@ impl FromStr for Ratio {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let fault = || format!("expected a fraction such as `1/3`, found `{text}`");
-        if let Some((whole, digits)) = text.trim().split_once('.') {
-            return decimal(whole, digits).ok_or_else(fault);
+        if text.contains('.') {
+            return decimal(text.trim()).ok_or_else(fault);
         }
         let (above, below) = text.split_once('/').unwrap_or((text, "1"));
         let above = above.trim().parse().map_err(|_| fault())?;
@@ -67,15 +67,10 @@ impl FromStr for Ratio {
 }
 
 /// `0.25` as an exact fraction.
-fn decimal(whole: &str, digits: &str) -> Option<Ratio> {
-    const MOST_DIGITS: usize = 17;
-    let all_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    if !all_digits(whole) || !all_digits(digits) || digits.len() > MOST_DIGITS {
-        return None;
-    }
-    let below = 10i64.checked_pow(u32::try_from(digits.len()).ok()?)?;
-    let above = whole.parse::<i64>().ok()?.checked_mul(below)?.checked_add(digits.parse().ok()?)?;
-    Ratio::new(above, below)
+fn decimal(text: &str) -> Option<Ratio> {
+    let unsigned = Some(text).filter(|text| text.starts_with(|c: char| c.is_ascii_digit()));
+    let number: Decimal = unsigned?.parse().ok()?;
+    Ratio::new(i64::try_from(number.units()).ok()?, 10i64.checked_pow(number.places())?)
 }
 
 impl TryFrom<String> for Ratio {

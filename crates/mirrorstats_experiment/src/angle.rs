@@ -5,7 +5,9 @@
 use serde::{Deserialize, Serialize};
 
 /// The direction of an upright body: multiples of 30 degrees counter-clockwise from +x, 0 to 11.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(transparent)]
 pub struct Heading(#[schemars(range(max = 11))] u8);
 
@@ -34,12 +36,10 @@ fn sine_of_fifteens(fifteens: usize) -> f64 {
 }
 
 impl Heading {
-    /// The heading of this many steps of 30 degrees, modulo full turns.
     pub const fn new(thirties: u8) -> Self {
         Self(thirties % HEADINGS)
     }
 
-    /// The heading nearest to a yaw in degrees.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0..12 after rem_euclid")]
     pub fn nearest(yaw: f64) -> Self {
         Self((yaw / 30.0).round().rem_euclid(f64::from(HEADINGS)) as u8)
@@ -50,7 +50,6 @@ impl Heading {
         self.0
     }
 
-    /// Degrees counter-clockwise from +x, 0 to 330.
     pub fn degrees(self) -> f64 {
         30.0 * f64::from(self.0)
     }

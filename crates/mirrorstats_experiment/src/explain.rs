@@ -7,92 +7,94 @@ use super::spec::{
 };
 use mirrorstats_exact::escape::visible;
 
-/// An experiment in words; `occlusion` says how much of the body the clutter hides.
-pub fn explained(experiment: &Experiment, occlusion: Option<String>) -> String {
+/// Measurements of the world's scenes, in words.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// The steps of the shortest ways.
+    pub ways: Option<String>,
+    /// The rate of a player without a mirror.
+    pub blind: Option<String>,
+    /// A warning if that is more than chance.
+    pub warning: Option<String>,
+}
+
+/// An experiment in words.
+pub fn explained(experiment: &Experiment, measured: &Measured) -> String {
     let mut text = format!("{}: {}\n", experiment.name(), visible(&experiment.title));
-    let mut line = |name: &str, words: String| {
+    let mut line = |name: &str, words: &str| {
         let _ = writeln!(text, "  {name:<10}{words}");
     };
-    let scenes = if experiment.scenes == experiment.name() {
-        "its own".to_owned()
+    if experiment.scenes == experiment.name() {
+        line("scenes", "its own");
     } else {
-        format!("those of {}: episodes of equal seed and run are pairs", experiment.scenes)
-    };
-    line("scenes", scenes);
-    line("body", body(experiment));
-    if let Some(shape) = experiment.body {
-        let words = match shape {
-            Body::Mannequin => "mannequins, with a neutral head and a face",
-            Body::Humanoid => "humanoids with the sizes of MuJoCo's, all in one colour",
-        };
-        line("shape", words.to_owned());
+        line("scenes", &format!("those of {}: episodes of equal seed and run are pairs", experiment.scenes));
     }
-    line("cubes", cubes(experiment.layout.cubes));
-    if let Some(words) = occlusion {
-        line("occlusion", words);
+    line("body", &body(experiment));
+    match experiment.body {
+        Some(Body::Mannequin) => line("shape", "mannequins, with a neutral head and a face"),
+        Some(Body::Humanoid) => line("shape", "humanoids with the sizes of MuJoCo's, all in one colour"),
+        None => {}
     }
-    line("others", others(experiment.layout.others));
+    line("cubes", &cubes(experiment.layout.cubes));
+    line("others", &others(experiment.layout.others, experiment.has_candidates()));
     let start = match experiment.layout.start {
         Start::FacingAway => "the first mirror, or its place, is out of view",
         Start::Any => "anywhere, facing anything",
         Start::BeforeMirror => "two metres before the first mirror, or its place, facing it",
     };
-    line("start", start.to_owned());
-    for pane in &experiment.panes {
-        line("mirror", self::pane(pane));
-    }
+    line("start", start);
+    experiment.panes.iter().for_each(|pane| line("mirror", &self::pane(pane)));
     if experiment.panes.is_empty() {
-        line("mirror", "none".to_owned());
+        line("mirror", "none");
     }
-    for mark in &experiment.marks {
-        line("mark", self::mark(*mark));
-    }
+    experiment.marks.iter().for_each(|mark| line("mark", &self::mark(*mark)));
     let stated = match experiment.stated_color {
         Stated::None => "",
         Stated::Candidate => "; it states the colour of another candidate as the body's",
-        Stated::Random => "; it states another colour as the body's",
+        Stated::Random => "; it states a colour as the body's that no candidate has",
     };
-    line("prompt", format!("{}{stated}", visible(&experiment.prompt)));
-    line("reply", experiment.keys().join(", "));
-    for answer in &experiment.answers {
-        line("answer", self::answer(answer));
-    }
+    line("prompt", &format!("{}{stated}", visible(&experiment.prompt)));
+    line("reply", &experiment.keys().join(", "));
+    experiment.answers.iter().for_each(|answer| line("answer", &self::answer(answer)));
     if !experiment.absent.is_empty() {
         let columns: Vec<&str> = experiment.absent.iter().map(|column| column.name()).collect();
-        line("absent", format!("{}: not used here, and in no trace", columns.join(", ")));
+        line("absent", &format!("{}: not used here, and in no trace", columns.join(", ")));
     }
     if let Some(hand) = experiment.hand {
-        line("hand", self::hand(hand));
+        line("hand", &self::hand(hand));
     }
     if experiment.camera == CameraKind::Behind {
-        line("camera", "behind the body and above it, which looks over its head".to_owned());
+        line("camera", "behind the body and above it, which looks over its head");
     }
-    if let Some(Picture { width, height, fovy }) = experiment.view {
-        line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
+    if let Some(Picture { width, height, fovy, eye_height_mm }) = experiment.view {
+        let eye = eye_height_mm.map_or_else(String::new, |mm| format!(", the eye at {} m", f64::from(mm) / 1000.0));
+        line("view", &format!("{width} x {height} pixels, {fovy} degrees high{eye}"));
     }
     if experiment.look == Look::Textured {
-        line("look", "panelled walls, soft shadows, mirrors with a frame and a slight tint".to_owned());
+        line("look", "panelled walls, soft shadows, mirrors with a frame and a slight tint");
     }
     let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
-    line("decision", format!("{} {at}, compared with {}", experiment.decision.name(), experiment.truth.name()));
-    line("scored by", visible(experiment.definitions.as_deref().unwrap_or("the default definitions")));
-    let steps = match (experiment.hand, experiment.steps) {
-        (Some(hand), None) => format!("those from the start to the mark, and {} more", hand.extra_steps),
-        (Some(hand), Some(most)) => {
-            format!("those from the start to the mark, and {} more; {most} at most", hand.extra_steps)
-        }
-        (None, steps) => steps.map_or_else(|| "as the world says".to_owned(), |steps| steps.to_string()),
-    };
-    line("steps", steps);
-    if experiment.hand.is_none() {
-        let length = experiment
-            .step_length_mm
-            .map_or_else(|| "as long as the world says".to_owned(), |mm| format!("{} m long", f64::from(mm) / 1000.0));
-        line("step", format!("{length}, turns of 30 degrees"));
+    line("decision", &format!("{} {at}, compared with {}", experiment.decision.name(), experiment.truth.name()));
+    line("scored by", &visible(experiment.definitions.as_deref().unwrap_or("the default definitions")));
+    if let Some(Hand { extra_steps, .. }) = experiment.hand {
+        let most = experiment.steps.map_or_else(String::new, |most| format!("; {most} at most"));
+        line("steps", &format!("those from the start to the mark, and {extra_steps} more{most}"));
+    } else {
+        let steps = experiment.steps.map_or_else(|| "as the world says".to_owned(), |steps| steps.to_string());
+        line("steps", &steps);
+        let metres = |mm| format!("{} m long", f64::from(mm) / 1000.0);
+        let length = experiment.step_length_mm.map_or_else(|| "as long as the world says".to_owned(), metres);
+        line("step", &format!("{length}, turns of 30 degrees"));
+    }
+    if let Some(words) = &measured.ways {
+        line("ways", words);
     }
     let chance: Vec<String> = experiment.chance.iter().map(|(metric, level)| format!("{metric} {level}")).collect();
     if !chance.is_empty() {
-        line("chance", visible(&chance.join(", ")));
+        line("chance", &visible(&chance.join(", ")));
+    }
+    if let Some(words) = &measured.blind {
+        line("blind", words);
     }
     text
 }
@@ -126,17 +128,18 @@ fn cubes(cubes: Cubes) -> String {
     }
 }
 
-fn others(others: Others) -> String {
+fn others(others: Others, has_candidates: bool) -> String {
     let does = match others.behavior {
         Behavior::Walk => "walk about",
         Behavior::Stand => "stand still",
     };
     let twin = match (others.color, others.twin_percent) {
         (Some(Paint::Own), _) => "all have the own colour".to_owned(),
-        (Some(Paint::Other), _) => "none has the own colour".to_owned(),
+        (Some(Paint::Other), _) => "none has the own colour, or that of a candidate".to_owned(),
         (Some(Paint::Named(color)), _) => format!("all are {}", color.name()),
-        (None, None) => "one of them has the own colour in the world's share of episodes".to_owned(),
-        (None, Some(percent)) => format!("one of them has the own colour in {percent} % of episodes"),
+        (None, _) if !has_candidates => "each in any colour".to_owned(),
+        (None, None) => "the world's share of them have a candidate's colour, the others any".to_owned(),
+        (None, Some(percent)) => format!("{percent} % of them have a candidate's colour, the others any"),
     };
     match (others.least, others.most) {
         (_, Some(0)) => "none".to_owned(),
@@ -149,6 +152,7 @@ fn others(others: Others) -> String {
 fn pane(pane: &Pane) -> String {
     let color = match pane.color {
         Paint::Own => "in the body's own colour".to_owned(),
+        Paint::Other if pane.kind == PaneKind::Window => "in a colour that no candidate has".to_owned(),
         Paint::Other => "in another colour, that of another candidate where there are candidates".to_owned(),
         Paint::Named(color) => format!("in {}", color.name()),
     };
@@ -165,12 +169,16 @@ fn pane(pane: &Pane) -> String {
     let wall = match pane.wall {
         Wall::Random => "a wall that is drawn",
         Wall::Opposite => "the wall across from the first",
+        Wall::Same => "the wall of the first, beside it",
         Wall::East => "the wall at +x",
         Wall::North => "the wall at +y",
         Wall::West => "the wall at -x",
         Wall::South => "the wall at -y",
     };
-    format!("{what}, on {wall}{}", sizes(pane))
+    let frame = if pane.frame { ", with a frame" } else { "" };
+    let [from, until] = [("from", pane.from_t), ("until", pane.until_t)]
+        .map(|(word, t)| t.map_or_else(String::new, |t| format!(", {word} step {t}")));
+    format!("{what}, on {wall}{frame}{from}{until}{}", sizes(pane))
 }
 
 fn sizes(pane: &Pane) -> String {

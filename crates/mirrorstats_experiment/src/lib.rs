@@ -50,16 +50,11 @@ pub use spec::Spec;
 /// Experiments are equal if their [`Spec`]s and places are. The built-in ones are first, in their order, then those of
 /// files, by place.
 #[derive(Clone)]
-pub struct Experiment(Origin);
-
-#[derive(Clone)]
-enum Origin {
-    /// The index in [`BUILT_IN`].
-    BuiltIn(usize),
-    File {
-        place: usize,
-        known: Arc<Known>,
-    },
+pub struct Experiment {
+    /// The index in [`BUILT_IN`], or that among those of files.
+    place: usize,
+    /// `None` for a built-in one.
+    own: Option<Arc<Known>>,
 }
 
 struct Known {
@@ -77,35 +72,37 @@ pub struct UnknownExperiment {
 }
 
 impl Experiment {
+    // Literals, since a reference to what a function returns would be to a temporary value.
     /// A mirror and three cubes.
-    pub const E1: Self = Self(Origin::BuiltIn(0));
+    pub const E1: Self = Self { place: 0, own: None };
     /// As E1 without the mirror.
-    pub const E2: Self = Self(Origin::BuiltIn(1));
+    pub const E2: Self = Self { place: 1, own: None };
     /// As E1 with a false colour stated.
-    pub const E3: Self = Self(Origin::BuiltIn(2));
+    pub const E3: Self = Self { place: 2, own: None };
     /// A mirror, three cubes and one to six others.
-    pub const E4: Self = Self(Origin::BuiltIn(3));
+    pub const E4: Self = Self { place: 3, own: None };
     /// A mirror, one to six others and clutter; no cube to select.
-    pub const E5: Self = Self(Origin::BuiltIn(4));
+    pub const E5: Self = Self { place: 4, own: None };
 
     pub const PAPER: [Self; 5] = [Self::E1, Self::E2, Self::E3, Self::E4, Self::E5];
 
-    pub fn parse(name: &str) -> Result<Self, UnknownExperiment> {
-        let at = built_in_names().iter().position(|known| *known == name);
-        at.map(|at| Self(Origin::BuiltIn(at))).ok_or_else(|| UnknownExperiment { name: name.to_owned() })
+    fn built_in(place: usize) -> Self {
+        Self { place, own: None }
     }
 
-    /// An experiment of a file, at this place among the others of files.
+    pub fn parse(name: &str) -> Result<Self, UnknownExperiment> {
+        let at = built_in_names().iter().position(|known| *known == name);
+        at.map(Self::built_in).ok_or_else(|| UnknownExperiment { name: name.to_owned() })
+    }
+
     fn from_file(place: usize, known: Known) -> Self {
-        Self(Origin::File { place, known: Arc::new(known) })
+        Self { place, own: Some(Arc::new(known)) }
     }
 
     /// The experiment that a trace's footer declares: the equal built-in one, or one without a prompt.
     pub fn from_footer(spec: Spec) -> Self {
-        // Older footers, which lack the definitions, differ in nothing else.
-        let unnamed = |known: &Spec| spec.definitions.is_none() && Spec { definitions: None, ..known.clone() } == spec;
-        match BUILT_IN.iter().position(|known| **known == spec || unnamed(known)) {
-            Some(at) => Self(Origin::BuiltIn(at)),
+        match BUILT_IN.iter().position(|known| **known == spec) {
+            Some(at) => Self::built_in(at),
             None => Self::from_file(0, Known { spec, templates: Templates::default() }),
         }
     }
@@ -113,25 +110,19 @@ impl Experiment {
     /// The same experiment; one of a file gets this place.
     #[must_use]
     pub fn at_place(self, place: usize) -> Self {
-        match self.0 {
-            Origin::File { known, .. } => Self(Origin::File { place, known }),
-            Origin::BuiltIn(_) => self,
-        }
+        if self.own.is_some() { Self { place, ..self } } else { self }
     }
 
     fn known(&self) -> &Known {
-        match &self.0 {
-            Origin::BuiltIn(at) => BUILT_IN[*at].known(),
-            Origin::File { known, .. } => known,
+        match &self.own {
+            Some(own) => own,
+            None => BUILT_IN[self.place].known(),
         }
     }
 
     /// The built-in index, or the place after all built-in ones.
     fn place(&self) -> usize {
-        match self.0 {
-            Origin::BuiltIn(at) => at,
-            Origin::File { place, .. } => BUILT_IN.len() + place,
-        }
+        if self.own.is_some() { BUILT_IN.len() + self.place } else { self.place }
     }
 
     pub fn name(&self) -> &str {
@@ -144,8 +135,8 @@ impl Experiment {
 
     /// A number for an agent's randomness: differs between experiments.
     pub fn number(&self) -> u64 {
-        match self.0 {
-            Origin::BuiltIn(at @ 0..5) => at as u64 + 1,
+        match self {
+            Self { own: None, place: place @ 0..5 } => *place as u64 + 1,
             _ => number_of(self.name()) >> 8,
         }
     }
@@ -211,4 +202,184 @@ impl Serialize for Experiment {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::spec::{Cubes, Decision, PaneKind, ReplyKey, Stated};
+    use super::{Experiment, built_in_names, file};
+    use mirrorstats_toml_spec::Source;
+
+    fn faults(text: &str) -> Vec<String> {
+        let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
+        let read = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs());
+        let faults = read.err().map(|faults| faults.0).unwrap_or_default();
+        faults.iter().map(|fault| format!("{}:{}", fault.line_and_column().0, fault.message)).collect()
+    }
+
+    #[test]
+    fn the_papers_five_experiments_come_first_and_match_the_paper() {
+        assert_eq!(Experiment::PAPER.each_ref().map(Experiment::name), ["E1", "E2", "E3", "E4", "E5"]);
+        assert_eq!(built_in_names()[..5], ["E1", "E2", "E3", "E4", "E5"]);
+        let [e1, e2, e3, e4, e5] = Experiment::PAPER;
+        assert_eq!([&e1, &e2, &e3].map(|one| one.scenes.clone()), ["E1"; 3]);
+        assert_eq!(
+            [&e1, &e2, &e3].map(|one| one.layout.clone()),
+            [e1.layout.clone(), e1.layout.clone(), e1.layout.clone()]
+        );
+        assert_eq!([&e1, &e2, &e3, &e4, &e5].map(|one| one.panes.len()), [1, 0, 1, 1, 1]);
+        assert!([&e1, &e3, &e4, &e5].iter().all(|one| one.panes[0].kind == PaneKind::Mirror));
+        assert_eq!([&e1, &e2, &e3, &e4].map(|one| one.layout.cubes), [Cubes::Candidates { count: 3 }; 4]);
+        assert_eq!(
+            [&e1, &e2, &e3, &e4, &e5].map(|one| one.stated_color == Stated::Candidate),
+            [false, false, true, false, false]
+        );
+        assert_eq!([&e1, &e5].map(|one| one.decision), [Decision::SelectedCube, Decision::SelfColor]);
+        let keys = [ReplyKey::ViewDescription, ReplyKey::Reasoning, ReplyKey::Action, ReplyKey::Summary];
+        assert_eq!(e1.reply, [&keys[..], &[ReplyKey::SelectedCube, ReplyKey::Identification]].concat());
+        assert_eq!(e5.reply, [&keys[..], &[ReplyKey::Identification]].concat());
+    }
+
+    #[test]
+    fn the_batterys_definitions_agree_with_its_experiment_files() {
+        let all = built_in_names().into_iter().flat_map(Experiment::parse);
+        for experiment in all.filter(|experiment| experiment.hand.is_none()) {
+            let definitions = experiment.definitions.as_deref().filter(|name| *name != "paper").unwrap_or("battery");
+            let document = mirrorstats_metric::file::read(definitions).unwrap();
+            let defined = &document.experiments[experiment.name()];
+            assert_eq!((defined.title.as_str(), defined.order), (experiment.title.as_str(), experiment.order));
+            let levels = |metric: &str| {
+                let level = defined.chance.get(metric).map(|(level, _)| level);
+                level.map(|level| level.as_ref().map_or_else(|| "none".to_owned(), ToString::to_string))
+            };
+            assert_eq!(levels("TSA"), experiment.chance.get("TSA").map(ToString::to_string), "{}", experiment.name());
+            assert_eq!(defined.chance.len(), experiment.chance.len());
+        }
+    }
+
+    #[test]
+    fn an_experiment_comes_back_from_a_footer() {
+        for experiment in built_in_names().into_iter().flat_map(Experiment::parse) {
+            let stored = serde_json::to_string(&*experiment).unwrap();
+            let spec = serde_json::from_str(&stored).unwrap();
+            assert_eq!(Experiment::from_footer(spec), experiment, "{stored}");
+        }
+    }
+
+    #[test]
+    fn every_fault_is_reported_at_once_with_its_line() {
+        let text = r#"
+[experiment.E1]
+title = "Mine"
+prompt = "cube-selection"
+cubes = { kind = "candidates", count = 30 }
+
+[experiment."a b"]
+titel = "Mine"
+scenes = "E7"
+prompt = "../../etc"
+step_length = nan
+decision = "mark_report"
+stated_color = "candiate"
+
+[[experiment."a b".mirror]]
+kind = "delayed"
+width = inf
+
+[[experiment."a b".mark]]
+part = "hand"
+color = "rad"
+from_t = 0
+on = "other"
+"#;
+        insta::assert_snapshot!("faults_of_a_file", faults(text).join("\n"));
+    }
+
+    #[test]
+    fn keys_that_depend_on_each_other_are_checked_together() {
+        let head = "[experiment.X]\ntitle = \"X\"\nprompt = \"cube-selection\"\n";
+        let of = |rest: &str| faults(&format!("{head}{rest}"));
+        insta::assert_snapshot!(
+            "faults_of_relations",
+            [
+                of("decision = \"selected_cube\"\ncubes = { kind = \"none\" }"),
+                of("stated_color = \"candidate\"\ncubes = { kind = \"none\" }\ndecision = \"self_color\""),
+                of("reply = [\"action\", \"action\", \"tail\"]"),
+                of("decision = \"mark_report\"\nreply = [\"action\", \"mark\"]"),
+                of("scenes = \"E1\"\ncubes = { kind = \"candidates\", count = 4 }"),
+                of("mirror = [{ kind = \"window\", delay = 3 }, { kind = \"decoy\", color = \"own\" }]"),
+                of("mirror = [{ wall = \"same\" }, { from_t = 9, until_t = 3 }]"),
+                of("mirror = [{}, { wall = \"west\" }]"),
+                of("mirror = [{}, {}, {}, {}, {}]"),
+                of("mark = [{ part = \"head\", on = \"other\" }]"),
+                of("mark = [{ part = \"head\" }, { part = \"head\" }]"),
+                of("others = { least = 3, most = 2 }"),
+                of("palette = [\"red\", \"red\"]"),
+                of("absent = [\"self_colour\", \"selected_cube\", \"t\"]"),
+            ]
+            .map(|faults| faults.join("; "))
+            .join("\n")
+        );
+    }
+
+    #[test]
+    fn a_file_may_hold_several_and_have_scenes_of_its_own() {
+        let text = "[experiment.A]\ntitle = \"A\"\nprompt = \"exploration\"\ncubes = { kind = \"none\" }\n\
+                    [experiment.B]\ntitle = \"B\"\nprompt = \"exploration\"\nscenes = \"A\"\n\
+                    [experiment.C]\ntitle = \"C\"\nprompt = \"exploration\"\nscenes = \"B\"\nmirror = [{ width = 2 }]";
+        let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
+        let entries = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap();
+        let specs: Vec<_> = entries.iter().map(|entry| &entry.experiment).collect();
+        assert_eq!(specs.iter().map(|spec| spec.scenes.as_str()).collect::<Vec<_>>(), ["A", "A", "A"]);
+        assert!(specs.iter().all(|spec| spec.layout == specs[0].layout && spec.decision == Decision::SelfColor));
+        assert_eq!(specs[2].panes[0].width_mm, Some(2000));
+    }
+
+    #[test]
+    fn a_mirror_with_a_delay_has_the_delayed_kind() {
+        let text = "[experiment.A]\ntitle = \"A\"\nprompt = \"cube-selection\"\n\
+                    mirror = [{ kind = \"mirror\", delay = 5 }, { delay = 0 }, { kind = \"decoy\", delay = 2 }]";
+        let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
+        let entries = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap();
+        let panes = &entries[0].experiment.panes;
+        let kinds: Vec<_> = panes.iter().map(|pane| (pane.kind, pane.delay)).collect();
+        assert_eq!(kinds, [(PaneKind::Delayed, 5), (PaneKind::Mirror, 0), (PaneKind::Decoy, 2)]);
+    }
+
+    #[test]
+    fn a_misspelt_built_in_prompt_is_suggested() {
+        let text = "[experiment.E9]\ntitle = \"x\"\nprompt = \"cube-selecton\"\n";
+        let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
+        let faults = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap_err();
+        let help =
+            faults.0.iter().find_map(|fault| fault.help.as_deref().filter(|help| help.contains("built in"))).unwrap();
+        assert!(help.ends_with("did you mean `cube-selection`?"), "{help}");
+    }
+
+    #[test]
+    fn an_invalid_answer_is_refused_with_its_location() {
+        let head = "[experiment.X]\ntitle = \"X\"\nprompt = \"answers\"\ncubes = { kind = \"none\" }\n";
+        let of = |answer: &str| faults(&format!("{head}answer = [{{ words = \"w\", {answer} }}]")).join("; ");
+        for (answer, expected) in [
+            ("key = \"Side\", type = \"number\", constant = \"1\"", "a key has 1 to 24 lower-case letters"),
+            ("key = \"action\", type = \"number\", constant = \"1\"", "a reply already has the key `action`"),
+            ("key = \"a\", type = \"number\"", "one of `truth`, `constant` and `conditions`, found 0"),
+            ("key = \"a\", type = \"number\", constant = \"one\"", "expected a number, found `one`"),
+            (
+                "key = \"a\", type = \"number\", truth = \"body_color\"",
+                "`body_color` is of type `color`, the answer of type `number`",
+            ),
+            ("key = \"a\", type = \"yes_no\", options = [\"b\", \"c\"], constant = \"yes\"", "has no options"),
+            ("key = \"a\", type = \"one_of\", options = [\"b\"], constant = \"b\"", "has 2 to 12 options, found 1"),
+            (
+                "key = \"a\", type = \"one_of\", options = [\"b\", \"unknown\"], constant = \"b\"",
+                "says that there is no evidence",
+            ),
+            (
+                "key = \"a\", type = \"one_of\", options = [\"b\", \"c\"], truth = \"mirror_place\"",
+                "as many options as there are bodies",
+            ),
+        ] {
+            let found = of(answer);
+            assert!(found.contains(expected), "{answer}: {found}");
+        }
+        assert_eq!(of("key = \"a\", type = \"color\", unknown = true, truth = \"mark_color\""), "");
+    }
+}

@@ -28,20 +28,14 @@ use mirrorstats_exact::input;
 
 const LARGEST: Limit = Limit::new("bytes of a prompt", 256 * 1024);
 
-/// A template: the name of its file without the ending, and its text.
-pub type Template = (String, String);
-
-/// The names of the templates, and their permitted values.
-const NAMES: [(&str, &[&str]); 5] = [
-    ("system", &["stated_color", "reply_keys", "answers"]),
-    ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall", "remaining", "budget"]),
-    ("history", &["first", "action", "thought", "steps"]),
-    ("position", &["x", "y", "yaw", "remaining", "budget"]),
-    ("warning", &[]),
+/// The names of the templates, their permitted values, and their shared defaults.
+const TEMPLATES: [(&str, &[&str], Option<&str>); 5] = [
+    ("system", &["stated_color", "reply_keys", "answers"], None),
+    ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall", "remaining", "budget"], None),
+    ("history", &["first", "action", "thought", "steps"], Some(include_str!("../../../assets/prompts/history.txt"))),
+    ("position", &["x", "y", "yaw", "remaining", "budget"], Some(include_str!("../../../assets/prompts/position.txt"))),
+    ("warning", &[], Some(include_str!("../../../assets/prompts/warning.txt"))),
 ];
-
-/// The templates that every folder must have; the others have defaults.
-const OWN: [&str; 2] = ["system", "user"];
 
 macro_rules! folder {
     ($name:literal: $($template:literal),+) => {
@@ -66,17 +60,10 @@ const BUILT_IN: [(&str, &[(&str, &str)]); 13] = [
     folder!("answers": "system", "user"),
 ];
 
-/// The three shared defaults.
-const SHARED: [(&str, &str); 3] = [
-    ("history", include_str!("../../../assets/prompts/history.txt")),
-    ("position", include_str!("../../../assets/prompts/position.txt")),
-    ("warning", include_str!("../../../assets/prompts/warning.txt")),
-];
-
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Templates {
-    /// `system`, `user`, `history`, `position`, `warning`, in this order; empty if only the hash is known.
-    pub all: Vec<Template>,
+    /// Names and texts: `system`, `user`, `history`, `position`, `warning`, in this order; empty if only the hash is known.
+    pub all: Vec<(String, String)>,
 }
 
 impl Templates {
@@ -88,8 +75,9 @@ impl Templates {
 
     pub fn built_in(name: &str) -> Option<Self> {
         let (_, own) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
-        let own: Vec<Template> = own.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
-        Some(Self::of(&own))
+        let text = |name: &str| own.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
+        let all = TEMPLATES.into_iter().filter_map(|(name, _, default)| Some((name, text(name).or(default)?)));
+        Some(Self { all: all.map(|(name, text)| (name.to_owned(), text.to_owned())).collect() })
     }
 
     pub fn built_in_names() -> Vec<&'static str> {
@@ -108,37 +96,30 @@ impl Templates {
         if !real.starts_with(&root) {
             return Err(format!("`{}` is a link that leads out of the folder of the experiment file", place.display()));
         }
-        let mut own = Vec::new();
-        for (name, _) in NAMES {
+        let mut all = Vec::new();
+        for (name, _, default) in TEMPLATES {
             let path = real.join(format!("{name}.txt"));
-            let is_needed = OWN.contains(&name);
-            if is_needed || path.exists() {
-                let is_inside = fs::canonicalize(&path).map_err(|error| unreadable(&path, &error))?.starts_with(&root);
-                if !is_inside {
-                    return Err(format!("`{}` is a link that leads out of the folder", path.display()));
-                }
-                own.push((name.to_owned(), input::text(&path, LARGEST).map_err(|error| unreadable(&path, &error))?));
+            if let Some(default) = default.filter(|_| !path.exists()) {
+                all.push((name.to_owned(), default.to_owned()));
+                continue;
             }
+            let is_inside = fs::canonicalize(&path).map_err(|error| unreadable(&path, &error))?.starts_with(&root);
+            if !is_inside {
+                return Err(format!("`{}` is a link that leads out of the folder", path.display()));
+            }
+            all.push((name.to_owned(), input::text(&path, LARGEST).map_err(|error| unreadable(&path, &error))?));
         }
-        let templates = Self::of(&own);
+        let templates = Self { all };
         templates.check()?;
         Ok(templates)
     }
 
-    fn of(own: &[Template]) -> Self {
-        let shared = |name: &str| SHARED.iter().find(|(known, _)| *known == name).map(|(_, text)| (*text).to_owned());
-        let text = |name: &str| own.iter().find(|(known, _)| known == name).map(|(_, text)| text.clone());
-        let all = NAMES.iter().filter_map(|(name, _)| Some(((*name).to_owned(), text(name).or_else(|| shared(name))?)));
-        Self { all: all.collect() }
-    }
-
     fn check(&self) -> Result<(), String> {
-        for ((name, text), (_, values)) in self.all.iter().zip(NAMES) {
-            let mut environment = Environment::new();
-            environment
-                .add_template(name, text)
-                .map_err(|error| format!("the template {name}.txt does not parse: {error}"))?;
-            let used = environment.get_template(name).map_err(|error| error.to_string())?.undeclared_variables(false);
+        let environment = Environment::new();
+        for ((name, text), (_, values, _)) in self.all.iter().zip(TEMPLATES) {
+            let template = environment.template_from_named_str(name, text);
+            let template = template.map_err(|error| format!("the template {name}.txt does not parse: {error}"))?;
+            let used = template.undeclared_variables(false);
             let mut unknown: Vec<&String> = used.iter().filter(|value| !values.contains(&value.as_str())).collect();
             unknown.sort();
             if let Some(value) = unknown.first() {

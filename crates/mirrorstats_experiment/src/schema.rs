@@ -8,11 +8,11 @@ use serde::Deserialize;
 
 use super::spec::{
     AbsentColumn, Actions, Answer, Body, BodyShown, CameraKind, Colors, Cubes, Decision, Look, MOST_MARKS, MOST_PANES,
-    Mark, Others, Paint, PaneKind, Picture, ReplyKey, Start, Stated, Truth, Wall,
+    Mark, Others, Paint, PaneKind, ReplyKey, Start, Stated, Truth, Wall,
 };
 use mirrorstats_metric::shape::{ChanceLevel, Fraction};
 use mirrorstats_trace::episodes::answers::MOST_ANSWERS;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// A file of experiments.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -35,14 +35,15 @@ pub struct ExperimentTable {
     pub title: String,
     /// Its position among experiments; after those that have one if absent.
     pub order: Option<i64>,
-    /// Chance levels by metric: a fraction such as `1/3`, a number, or `none`.
+    /// Chance levels by metric: a fraction such as `1/3`, a number, one of them for each blind strategy, or `none`.
     #[serde(default)]
     pub chance: IndexMap<String, ChanceLevel>,
     /// The rates of blind strategies, by metric, where no chance level applies.
     #[serde(default)]
     pub reference: IndexMap<String, Vec<Fraction>>,
     /// A built-in experiment, or one above in the file, whose scenes it has: episodes of equal seed and run are pairs. Its
-    /// own if absent. `colors`, `palette`, `cubes`, `others` and `start` are then those of that experiment.
+    /// own if absent. `colors`, `palette`, `cubes`, `others` and `start` are then those of that experiment. `steps`,
+    /// `step_length`, `view`, `camera`, `look` and `body` change no scene.
     pub scenes: Option<String>,
     /// The draw of the body's colour; `balanced` if absent.
     pub colors: Option<Colors>,
@@ -102,8 +103,8 @@ pub struct ExperimentTable {
     pub mark: Vec<Mark>,
     /// The hand that moves in place of the body, to reach the mark on its front; none if absent.
     pub hand: Option<HandTable>,
-    /// The size and the angle of the picture; the world's if absent.
-    pub view: Option<Picture>,
+    /// The size, the angle and the height of the picture; the world's if absent.
+    pub view: Option<ViewTable>,
     /// How the room and its mirrors look: `plain`, or `textured`, with panelled walls, soft shadows, and frame and tint of a
     /// mirror; `plain` if absent.
     pub look: Option<Look>,
@@ -149,14 +150,40 @@ pub struct MirrorTable {
     /// Its wall; `random` if absent. The first one's wall is part of the scene.
     pub wall: Option<Wall>,
     /// Along the wall, m; the world's if absent.
-    #[schemars(range(min = 0.5, max = 10.0))]
+    #[schemars(range(min = 0.1, max = 10.0))]
     pub width: Option<f64>,
     /// m; the world's if absent.
-    #[schemars(range(min = 0.5, max = 5.0))]
+    #[schemars(range(min = 0.1, max = 5.0))]
     pub height: Option<f64>,
     /// Of its lower edge above the floor, m; about the world's height of centres if absent.
     #[schemars(range(min = 0.0, max = 3.0))]
     pub bottom: Option<f64>,
+    /// The first step that shows it, at most the experiment's `steps`; 1 if absent. Before it the wall is bare.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub from_t: Option<u32>,
+    /// The last step that shows it; the last of the episode if absent.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub until_t: Option<u32>,
+    /// True if it has a frame of wood; all mirrors have one if `look` is `textured`.
+    pub frame: Option<bool>,
+}
+
+/// The size, the angle and the height of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ViewTable {
+    /// Pixels in a row; 640 if absent.
+    #[schemars(range(min = 16, max = 1920))]
+    pub width: Option<u32>,
+    /// Rows; 480 if absent.
+    #[schemars(range(min = 12, max = 1440))]
+    pub height: Option<u32>,
+    /// The vertical field of view, degrees; 60 if absent.
+    #[schemars(range(min = 30, max = 115))]
+    pub fovy: Option<u32>,
+    /// The height of the eye above the floor, m; the world's if absent.
+    #[schemars(range(min = 0.5, max = 1.9))]
+    pub eye_height: Option<f64>,
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::names;
 
 pub use answers::{Answer, AnswerType, Fact, Side, UNKNOWN};
@@ -34,9 +35,9 @@ pub struct Spec {
     /// Its position among experiments; after those that have one if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<i64>,
-    /// Chance levels by metric: a fraction such as `1/3`, or `none`.
+    /// Chance levels by metric: a fraction such as `1/3`, one for each blind strategy, or `none`.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
-    pub chance: IndexMap<String, String>,
+    pub chance: IndexMap<String, Chance>,
     /// The rates of blind strategies, by metric, where no chance level applies.
     #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
     pub reference: IndexMap<String, Vec<String>>,
@@ -136,50 +137,39 @@ pub struct Hand {
     pub extra_steps: u32,
 }
 
-/// The size and the angle of a picture.
+/// The size, the angle and the height of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct Picture {
     /// Pixels in a row.
-    #[schemars(range(min = 16, max = 1920))]
     pub width: u32,
     /// Rows.
-    #[schemars(range(min = 12, max = 1440))]
     pub height: u32,
     /// The vertical field of view, degrees.
-    #[schemars(range(min = 30, max = 115))]
     pub fovy: u32,
-}
-
-impl Default for Picture {
-    fn default() -> Self {
-        Self { width: 640, height: 480, fovy: 60 }
-    }
+    /// The height of the eye above the floor, mm; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eye_height_mm: Option<u32>,
 }
 
 /// A key of a reply; its value is a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum ReplyKey {
     /// The description of the image.
     #[serde(rename = "view-description")]
     ViewDescription,
     /// The reason for this action.
-    #[serde(rename = "reasoning")]
     Reasoning,
     /// The action.
-    #[serde(rename = "action")]
     Action,
     /// The summary, which the next step gets as its history.
-    #[serde(rename = "summary")]
     Summary,
     /// The cube: a colour, or `none`.
-    #[serde(rename = "selected_cube")]
     SelectedCube,
     /// The own body's colour in words.
-    #[serde(rename = "identification")]
     Identification,
     /// The mark on the own body: a colour, or `none`.
-    #[serde(rename = "mark")]
     Mark,
 }
 
@@ -260,7 +250,7 @@ pub enum Stated {
     None,
     /// The colour of another candidate: false.
     Candidate,
-    /// Any other colour of the palette: false.
+    /// The colour of no candidate, or without such a colour any but the body's: false.
     Random,
 }
 
@@ -321,7 +311,6 @@ impl Spec {
         matches!(self.layout.cubes, Cubes::Candidates { .. })
     }
 
-    /// The keys of a reply, in the order of the prompt.
     pub fn keys(&self) -> Vec<&str> {
         let own = self.answers.iter().map(|answer| answer.key.as_str());
         self.reply.iter().map(|key| key.name()).chain(own).collect()

@@ -5,22 +5,24 @@ mod checks;
 mod hand;
 mod mirrors;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use indexmap::IndexMap;
 
 use super::prompt::Templates;
-use super::schema::ExperimentTable;
+use super::schema::{ExperimentTable, ViewTable};
 use super::spec::{
-    AbsentColumn, Actions, Behavior, Colors, Cubes, Decision, Layout, Mark, Others, ReplyKey, Spec, Start, Stated,
-    Truth, Wall, Wearer,
+    AbsentColumn, Actions, Behavior, CameraKind, Colors, Cubes, Decision, Layout, Others, Picture, ReplyKey, Spec,
+    Start, Stated, Truth, Wall, Wearer,
 };
 use super::{Experiment, Known, built_in_names};
+use mirrorstats_exact::chance::{Chance, NoLevel};
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_exact::suggest::{self, nearest};
 use mirrorstats_metric::file::{self as definitions, Document};
 use mirrorstats_toml_spec::{At, Fault, Place};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 const LONGEST_NAME: usize = 40;
 
@@ -29,9 +31,16 @@ const LONGEST_NAME: usize = 40;
 pub struct Loaded {
     pub experiment: Experiment,
     pub name: Place,
-    /// The location of its cubes, or of its name if it does not mention cubes.
-    pub cubes: Place,
+    /// The locations of its keys' values.
+    keys: BTreeMap<String, Place>,
     pub mirrors: Vec<Place>,
+}
+
+impl Loaded {
+    /// The location of a key, or of its name if it does not mention the key.
+    pub fn key(&self, key: &str) -> &Place {
+        self.keys.get(key).unwrap_or(&self.name)
+    }
 }
 
 pub(super) struct Beside<'a> {
@@ -42,11 +51,11 @@ pub(super) struct Beside<'a> {
     pub before: &'a [&'a Spec],
 }
 
-/// Parses one experiment; `None` if it has errors.
 pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault>) -> Option<Loaded> {
     let before = faults.len();
     check_name(name, at, beside, faults);
     let table: ExperimentTable = mirrorstats_toml_spec::read(at, "an experiment", faults)?;
+    checks::first_steps(&table, at, faults);
     let panes = mirrors::panes(&table.mirror, &at.key("mirror"), faults);
     let first_wall = panes.first().map_or(Wall::Random, |pane| pane.wall);
     let (scenes, layout) = scenes(name, &table, at, first_wall, beside, faults);
@@ -70,7 +79,6 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     let absent = absent(table.absent.unwrap_or_default(), &reply, at, faults);
     let (prompt, templates) = prompt(table.prompt, at, beside, faults);
     answers::check(&table.answer, &at.key("answer"), faults);
-    check_marks(&table.mark, table.steps, at, faults);
     let spec = Spec {
         name: name.to_owned(),
         title: table.title,
@@ -95,7 +103,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
         panes,
         marks: table.mark,
         hand,
-        view: table.view,
+        view: table.view.map(picture),
         absent,
         look: table.look.unwrap_or_default(),
         body: table.body,
@@ -116,7 +124,7 @@ pub(super) fn read(name: &str, at: &At<'_>, beside: &Beside<'_>, faults: &mut Ve
     (faults.len() == before).then(|| Loaded {
         experiment: Experiment::from_file(beside.place, Known { spec, templates }),
         name: at.name_place(),
-        cubes: at.get("cubes").map_or_else(|| at.name_place(), |cubes| cubes.place()),
+        keys: at.entries().map(|(key, value)| (key.to_owned(), value.place())).collect(),
         mirrors: at.key("mirror").items().map(|mirror| mirror.name_place()).collect(),
     })
 }
@@ -129,12 +137,11 @@ fn holds(at: &At<'_>, fault: &Fault) -> bool {
         || at.entries().any(|(_, value)| holds(&value, fault))
 }
 
-fn levels(at: &At<'_>, document: Option<&Document>, faults: &mut Vec<Fault>) -> IndexMap<String, String> {
+fn levels(at: &At<'_>, document: Option<&Document>, faults: &mut Vec<Fault>) -> IndexMap<String, Chance> {
     let mut level = |metric: &str, at: &At<'_>| {
-        let is_none = at.written() == "none";
-        let ratio = if is_none { None } else { Some(at.parse::<Ratio>(faults)?) };
-        checks::level(metric, ratio, at, document, faults);
-        Some(ratio.map_or_else(|| "none".to_owned(), |ratio| ratio.to_string()))
+        let chance = definitions::chance_level(at, faults)?.unwrap_or(Chance::None(NoLevel::None));
+        checks::level(metric, chance.levels().last().map(|(_, level)| *level), at, document, faults);
+        Some(chance)
     };
     at.within("chance").filter_map(|(metric, at)| Some((metric.to_owned(), level(metric, &at)?))).collect()
 }
@@ -349,14 +356,10 @@ fn prompt(name: String, at: &At<'_>, beside: &Beside<'_>, faults: &mut Vec<Fault
     }
 }
 
-/// Checks that each mark appears before the last step.
-fn check_marks(marks: &[Mark], steps: Option<u32>, at: &At<'_>, faults: &mut Vec<Fault>) {
-    for (n, mark) in marks.iter().enumerate() {
-        if let Some(steps) = steps.filter(|steps| mark.from_t > *steps) {
-            let at = at.key("mark").item(n).key("from_t");
-            faults.push(at.fault(format!("`from_t` may be 1 to {steps}, but is {}", mark.from_t)));
-        }
-    }
+fn picture(ViewTable { width, height, fovy, eye_height }: ViewTable) -> Picture {
+    let [width, height, fovy] =
+        [(width, 640), (height, 480), (fovy, 60)].map(|(value, absent)| value.unwrap_or(absent));
+    Picture { width, height, fovy, eye_height_mm: eye_height.map(millimetres) }
 }
 
 fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
@@ -368,6 +371,10 @@ fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
     if spec.stated_color == Stated::Candidate && !spec.has_candidates() {
         let fault = at.key("stated_color").fault("there is no other candidate whose colour could be stated");
         faults.push(fault.help("use `stated_color = \"random\"`"));
+    }
+    if spec.camera == CameraKind::Behind && spec.view.is_some_and(|view| view.eye_height_mm.is_some()) {
+        let fault = at.key("view").fault("`eye_height` is that of the agent's eye, and the camera is behind the body");
+        faults.push(fault.help("leave `eye_height` out, or use `camera = \"eye\"`"));
     }
     let wears = |wearer: Wearer| spec.marks.iter().any(|mark| mark.on == wearer);
     if spec.truth == Truth::MarkColor && !wears(Wearer::Own) {

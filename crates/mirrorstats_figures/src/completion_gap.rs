@@ -1,11 +1,11 @@
 //! `completion-gap`: a rate among finished episodes minus the rate among all, models by experiments.
 
+use crate::kit::lettering::NAME_ROOM;
 use crate::kit::{
     Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, TextAnchor, label, leading, legend, lettering, many, tiles,
 };
-use crate::matrix::{MetricId, Reading};
+use crate::matrix::{MetricId, Value};
 use crate::{Drawn, Scene, missing};
-use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::Decimal;
 
 const ROW: f64 = 20.0;
@@ -17,7 +17,7 @@ const LEAST_WIDTH: f64 = 400.0;
 pub fn draw(scene: Scene<'_>) -> Drawn {
     let Scene { matrix, roster, width: all, .. } = scene;
     let gaps = Gaps::new(scene);
-    let (labels, label_width) = tiles::row_labels(&roster.names(), scene.name_room());
+    let (labels, label_width) = scene.row_labels(NAME_ROOM);
     let left = MARGIN + label_width + 8.0;
     let columns = many(matrix.experiments.len());
     let cell = ((all - MARGIN - left) / columns).clamp(LEAST_CELL, CELL);
@@ -53,33 +53,26 @@ struct Gaps<'a> {
 impl<'a> Gaps<'a> {
     fn new(scene: Scene<'a>) -> Self {
         let mut gaps = Self { scene, ids: [scene.metrics[0], scene.metrics[1]], largest: 0.0, has_fall: false };
-        for gap in scene.matrix.pairs().filter_map(|(e, m)| gaps.gap(e, m)).collect::<Vec<_>>() {
+        for (gap, _) in scene.matrix.pairs().filter_map(|(e, m)| gaps.gap(e, m)).collect::<Vec<_>>() {
             gaps.largest = gaps.largest.max(gap.abs());
             gaps.has_fall |= gap < 0.0;
         }
         gaps
     }
 
-    fn moments(&self, experiment: &str, model: &str) -> Option<[Moments; 2]> {
+    /// The gap, and its exact value with two decimal places and a sign.
+    fn gap(&self, experiment: &str, model: &str) -> Option<(f64, String)> {
         let [finished, all] = self.ids.map(|id| self.scene.matrix.reading(experiment, model, id).moments());
-        Some([finished?, all?])
-    }
-
-    fn gap(&self, experiment: &str, model: &str) -> Option<f64> {
-        let [finished, all] = self.moments(experiment, model)?;
-        Some(finished.mean()? - all.mean()?)
-    }
-
-    fn text(&self, experiment: &str, model: &str) -> Option<String> {
-        let [finished, all] = self.moments(experiment, model)?;
+        let (finished, all) = (finished?, all?);
         let (a, b) = (i128::from(finished.n), i128::from(all.n));
         let above = finished.sum.checked_mul(b)?.checked_sub(all.sum.checked_mul(a)?)?;
         let gap = Decimal::of_ratio(above, a.checked_mul(b)?, 2)?.to_string();
-        Some(match gap.strip_prefix('-') {
+        let text = match gap.strip_prefix('-') {
             Some(size) => format!("−{size}"),
             None if gap == "0.00" => gap,
             None => format!("+{gap}"),
-        })
+        };
+        Some((finished.mean()? - all.mean()?, text))
     }
 
     fn color(&self, gap: f64) -> Rgb {
@@ -89,7 +82,7 @@ impl<'a> Gaps<'a> {
 
     fn draw(&self, sheet: &mut Sheet, experiment: &str, model: &str, frame: Frame) {
         let [finished, all] = self.ids.map(|id| self.scene.matrix.reading(experiment, model, id));
-        let (gap, text) = (self.gap(experiment, model), self.text(experiment, model));
+        let (gap, text) = self.gap(experiment, model).unzip();
         let words = text.as_deref().unwrap_or("undefined");
         let [among, whole] = self.ids.map(|id| id.name);
         let parts = format!("{among}: {}, {whole}: {}", finished.words(), all.words());
@@ -98,8 +91,8 @@ impl<'a> Gaps<'a> {
             .value(gap)
             .with("n", all.n())
             .with("n-finished", finished.n());
-        sheet.mark(&mark, |sheet| match (all, gap) {
-            (Reading::Empty, _) => tiles::empty(sheet, frame),
+        sheet.mark(&mark, |sheet| match (all.value, gap) {
+            (Value::Empty, _) => tiles::empty(sheet, frame),
             (_, None) => tiles::undefined(sheet, frame),
             (_, Some(gap)) => tiles::known(sheet, frame, self.color(gap), text.as_slice()),
         });
@@ -113,6 +106,7 @@ impl<'a> Gaps<'a> {
         let scale = tiles::scale(sheet, (MARGIN, top), color, [&low_text, &format!("+{size}")]);
         let matrix = self.scene.matrix;
         let readings = matrix.pairs().flat_map(|(e, m)| self.ids.map(|id| matrix.reading(e, m, id)));
-        legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings)).max(top + 14.0) + MARGIN
+        legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings, missing::TILES)).max(top + 14.0)
+            + MARGIN
     }
 }

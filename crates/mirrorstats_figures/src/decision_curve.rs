@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::kit::{
-    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Point, Sheet, Stroke, Swatch, legend, many,
-    marker, panels, rate_ticks, whole_ticks,
+    Frame, Grid, MARGIN, Mark, Member, PALETTE, Plot, Point, ROOM_BELOW, ROOM_LEFT, Sheet, Stroke, Swatch, legend,
+    many, marker, rate_ticks, whole_ticks,
 };
 use crate::matrix::MetricId;
 use crate::{Drawn, FigureError, FigureName, Scene};
@@ -15,32 +15,25 @@ use mirrorstats_statistics::durations::survival::Survival;
 const MOST_COLUMNS: usize = 3;
 const LEAST_PANEL: f64 = 120.0;
 const PLOT_HEIGHT: f64 = 130.0;
-const AXIS_ROOM: f64 = 34.0;
-const AXIS_BELOW: f64 = 28.0;
 /// The distance between markers along a curve, px.
 const MARKER_EVERY: f64 = 38.0;
 
 pub fn draw(scene: Scene<'_>, episodes: &EpisodeTable) -> Result<Drawn, FigureError> {
     let endings = endings(episodes, scene.metrics)?;
     let Scene { matrix, roster, width, .. } = scene;
-    let gap = AXIS_ROOM + 8.0;
-    let left = MARGIN + AXIS_ROOM;
-    let (columns, _) = panels::most(MOST_COLUMNS, width - left - MARGIN, [LEAST_PANEL, gap]);
-    let arranged = Arrangement { left, columns, height: PLOT_HEIGHT + AXIS_BELOW, gap };
-    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), width, arranged);
-    let mut sheet = panels.sheet(width);
+    let grid = Grid { width, left: MARGIN + ROOM_LEFT, gap: ROOM_LEFT + 8.0, columns: MOST_COLUMNS };
+    let titles = matrix.titles(&matrix.experiments);
+    let (mut sheet, panels) = grid.at_least(LEAST_PANEL).panels(&matrix.experiments, &titles, PLOT_HEIGHT + ROOM_BELOW);
     let last = endings.values().flatten().map(|ending| ending.steps).max().unwrap_or(1).max(1);
     for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
         let plot = Plot::new(Frame { height: PLOT_HEIGHT, ..*body }, 0.0..real(last) * 1.03, 0.0..1.04);
-        plot.x_axis(&mut sheet, &whole_ticks(u32::try_from(last).unwrap_or(u32::MAX), 5));
-        plot.y_axis(&mut sheet, &rate_ticks());
-        plot.x_title(&mut sheet, "step t");
-        plot.y_title(&mut sheet, "share decided", 26.0);
+        let steps = whole_ticks(u32::try_from(last).unwrap_or(u32::MAX), 5);
+        plot.axes(&mut sheet, (&steps, "step t"), (&rate_ticks(), "share decided"));
         for (at, member) in roster.0.iter().enumerate() {
             let survival = endings.get(&(*experiment, member.model)).and_then(|endings| Survival::of(endings));
             if let Some(survival) = survival {
                 let phase = many(at) / many(roster.0.len());
-                Curve { experiment, member: *member, survival, phase }.draw(&mut sheet, &plot);
+                curve(&mut sheet, &plot, &survival, experiment, *member, phase);
             }
         }
     }
@@ -74,59 +67,46 @@ fn column<'a>(episodes: &'a EpisodeTable, name: &str) -> Result<&'a MetricColumn
     })
 }
 
-struct Curve<'a> {
-    experiment: &'a str,
-    member: Member<'a>,
-    survival: Survival,
-    /// The position of the first marker, in [0, 1) of a distance: markers of coinciding curves differ.
-    phase: f64,
-}
-
-impl Curve<'_> {
-    fn draw(&self, sheet: &mut Sheet, plot: &Plot) {
-        let mut corners = vec![plot.at(0.0, 0.0)];
-        let mut share = 0.0;
-        for point in &self.survival.points {
-            corners.push(plot.at(real(point.steps), share));
-            share = 1.0 - point.undecided;
-            corners.push(plot.at(real(point.steps), share));
-        }
-        sheet.mark(&self.mark(), |sheet| {
-            sheet.line(&corners, self.member.style.stroke(1.3));
-            self.censored(sheet, plot);
-            // The wait before the first decision is the same for all curves, and too crowded for markers.
-            let marked = if share > 0.0 { &corners[1..] } else { &corners[..] };
-            for place in along(marked, self.phase) {
-                marker::draw(sheet, place, 2.4, self.member.style);
-            }
-        });
+/// Draws a step curve. `phase` is the position of its first marker, in [0, 1) of a distance, so that the markers of
+/// coinciding curves differ.
+fn curve(sheet: &mut Sheet, plot: &Plot, survival: &Survival, experiment: &str, member: Member<'_>, phase: f64) {
+    let points = &survival.points;
+    let mut corners = vec![plot.at(0.0, 0.0)];
+    let mut share = 0.0;
+    for point in points {
+        corners.push(plot.at(real(point.steps), share));
+        share = 1.0 - point.undecided;
+        corners.push(plot.at(real(point.steps), share));
     }
-
-    fn censored(&self, sheet: &mut Sheet, plot: &Plot) {
-        let points = &self.survival.points;
+    sheet.mark(&mark(survival, experiment, member.model), |sheet| {
+        sheet.line(&corners, member.style.stroke(1.3));
         for (at, point) in points.iter().enumerate() {
             let later = points.get(at + 1).map_or(0, |next| next.at_risk);
             if point.at_risk > point.decided + later {
                 let (x, y) = plot.at(real(point.steps), 1.0 - point.undecided);
-                sheet.line(&[(x, y - 3.0), (x, y + 3.0)], Stroke::solid(self.member.style.color, 1.2));
+                sheet.line(&[(x, y - 3.0), (x, y + 3.0)], Stroke::solid(member.style.color, 1.2));
             }
         }
-    }
+        // The wait before the first decision is the same for all curves, and too crowded for markers.
+        let marked = if share > 0.0 { &corners[1..] } else { &corners[..] };
+        for place in along(marked, phase) {
+            marker::draw(sheet, place, 2.4, member.style);
+        }
+    });
+}
 
-    fn mark(&self) -> Mark {
-        let points = &self.survival.points;
-        let decided: u64 = points.iter().map(|point| point.decided).sum();
-        let n = points.first().map_or(0, |point| point.at_risk);
-        let median = self.survival.median();
-        let median_words = median.map_or("none".to_owned(), |step| format!("t = {step}"));
-        let model = self.member.model;
-        let title = format!("{} · {model}: {decided} of {n} decided, median {median_words}", self.experiment);
-        Mark::of_cell(title, self.experiment, model, "decided")
-            .value(points.last().map(|point| 1.0 - point.undecided))
-            .with("n", n)
-            .with("decided", decided)
-            .with("median", median.map(|step| step.to_string()).unwrap_or_default())
-    }
+fn mark(survival: &Survival, experiment: &str, model: &str) -> Mark {
+    let points = &survival.points;
+    let decided: u64 = points.iter().map(|point| point.decided).sum();
+    let n = points.first().map_or(0, |point| point.at_risk);
+    let median = survival.median();
+    let median_words = median.map_or("none".to_owned(), |step| format!("t = {step}"));
+    let title = format!("{experiment} · {model}: {decided} of {n} decided, median {median_words}");
+    Mark::of_cell(title, experiment, model, "decided")
+        .value(points.last().map(|point| 1.0 - point.undecided))
+        .with("n", n)
+        .with("decided", decided)
+        .with("median", median.map(|step| step.to_string()).unwrap_or_default())
 }
 
 /// Evenly spaced points on a line; the first is `phase` of a distance from the start.

@@ -1,20 +1,16 @@
 //! `dose-response`: a rate of each model, with its 95 % interval, against the dose of each factor.
 
 use crate::kit::{
-    Arrangement, Frame, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Stroke, Swatch, Tick, legend, lettering,
-    many, marker, panels, rate_ticks,
+    Frame, Grid, MARGIN, Mark, Member, Plot, Point, ROOM_BELOW, ROOM_LEFT, Sheet, Stroke, Swatch, Tick, legend,
+    lettering, many, marker, rate_ticks,
 };
-use crate::matrix::{MetricId, Reading};
 use crate::{Drawn, FigureError, Scene};
 use mirrorstats_exact::number;
 use mirrorstats_metric::catalogs::catalog::Factor;
-use mirrorstats_statistics::intervals::interval::Interval;
 
 const MOST_COLUMNS: usize = 2;
 const LEAST_PANEL: f64 = 190.0;
 const PLOT_HEIGHT: f64 = 190.0;
-const AXIS_ROOM: f64 = 34.0;
-const AXIS_BELOW: f64 = 28.0;
 /// The distance between the markers of two models at one dose, px.
 const APART: f64 = 5.0;
 
@@ -25,25 +21,21 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     if shown.is_empty() {
         return Err(FigureError::NoFactor { found: matrix.experiments.join(", ") });
     }
-    let (gap, left) = (AXIS_ROOM + 8.0, MARGIN + AXIS_ROOM);
-    let columns = panels::fitting(shown.len(), MOST_COLUMNS, width - left - MARGIN, [LEAST_PANEL, gap]);
-    let arranged = Arrangement { left, columns, height: PLOT_HEIGHT + AXIS_BELOW, gap };
+    let grid = Grid { width, left: MARGIN + ROOM_LEFT, gap: ROOM_LEFT + 8.0, columns: MOST_COLUMNS };
     let names: Vec<&str> = shown.iter().map(|factor| factor.name).collect();
-    let panels = Panels::new(&names, &[], width, arranged);
-    let mut sheet = panels.sheet(width);
+    let (mut sheet, panels) =
+        grid.at_least(LEAST_PANEL).balanced(names.len()).panels(&names, &[], PLOT_HEIGHT + ROOM_BELOW);
     for (factor, body) in shown.iter().zip(&panels.bodies) {
         let last = factor.at(factor.doses.len() - 1);
         let margin = (last - factor.at(0)) * 0.06;
         let frame = Frame { height: PLOT_HEIGHT, ..*body };
         let plot = Plot::new(frame, factor.at(0) - margin..last + margin, -0.03..1.03);
-        plot.x_axis(&mut sheet, &factor.ticks(&plot));
-        plot.y_axis(&mut sheet, &rate_ticks());
-        plot.x_title(&mut sheet, &factor.factor.label());
-        plot.y_title(&mut sheet, metrics[0].name, 26.0);
+        let doses = (&factor.ticks(&plot)[..], &factor.factor.label()[..]);
+        plot.axes(&mut sheet, doses, (&rate_ticks(), metrics[0].name));
         for (at, member) in roster.0.iter().enumerate() {
             let step = APART.min(body.width * 0.06 / many(roster.0.len().max(2) - 1));
             let aside = step * (many(at) - many(roster.0.len() - 1) / 2.0);
-            Line { scene, metric: metrics[0], factor, member: *member, aside }.draw(&mut sheet, &plot);
+            line(&mut sheet, &plot, scene, factor, *member, aside);
         }
     }
     let height = legend::around(&mut sheet, roster, &panels, Swatch::Line, Vec::new());
@@ -74,7 +66,7 @@ impl<'a> Shown<'a> {
         let mut free = f64::NEG_INFINITY;
         let tick = |dose: usize| {
             let (at, mut text) = (self.at(dose), number::full_precision(self.doses[dose].1));
-            let (middle, half) = (plot.at(at, 0.0).0, lettering::tick().width(&text) / 2.0);
+            let (middle, half) = (plot.x(at), lettering::tick().width(&text) / 2.0);
             if middle - half < free {
                 text.clear();
             } else {
@@ -86,50 +78,29 @@ impl<'a> Shown<'a> {
     }
 }
 
-struct Line<'a> {
-    scene: Scene<'a>,
-    metric: MetricId<'a>,
-    factor: &'a Shown<'a>,
-    member: Member<'a>,
-    /// The distance of its markers from the dose, px.
-    aside: f64,
-}
-
-impl Line<'_> {
-    fn draw(&self, sheet: &mut Sheet, plot: &Plot) {
-        let points: Vec<(usize, Reading, Point)> =
-            (0..self.factor.doses.len()).filter_map(|at| self.point(plot, at)).collect();
-        let places: Vec<Point> = points.iter().map(|(.., place)| *place).collect();
-        if places.len() > 1 {
-            let title = format!("{} · {}", self.factor.name, self.member.model);
-            sheet.mark(&Mark::new(title), |sheet| sheet.line(&places, self.member.style.stroke(1.3)));
-        }
-        for (at, reading, place) in points {
-            self.marker(sheet, plot, at, reading, place);
-        }
+/// Draws the line of a model, with its markers `aside` px from the doses.
+fn line(sheet: &mut Sheet, plot: &Plot, scene: Scene<'_>, factor: &Shown<'_>, member: Member<'_>, aside: f64) {
+    let point = |at: usize| {
+        let (experiment, dose) = factor.doses[at];
+        let reading = scene.matrix.reading(experiment, member.model, scene.metrics[0]);
+        let (x, y) = plot.at(factor.at(at), reading.mean()?);
+        Some((dose, reading, (x + aside, y)))
+    };
+    let points: Vec<_> = (0..factor.doses.len()).filter_map(point).collect();
+    let places: Vec<Point> = points.iter().map(|(.., place)| *place).collect();
+    if places.len() > 1 {
+        let title = format!("{} · {}", factor.name, member.model);
+        sheet.mark(&Mark::new(title), |sheet| sheet.line(&places, member.style.stroke(1.3)));
     }
-
-    fn point(&self, plot: &Plot, at: usize) -> Option<(usize, Reading, Point)> {
-        let reading = self.scene.matrix.reading(self.factor.doses[at].0, self.member.model, self.metric);
-        let (x, y) = plot.at(self.factor.at(at), reading.mean()?);
-        Some((at, reading, (x + self.aside, y)))
-    }
-
-    fn marker(&self, sheet: &mut Sheet, plot: &Plot, at: usize, reading: Reading, (x, y): Point) {
-        let (experiment, dose) = self.factor.doses[at];
-        let interval = reading.wilson();
-        let mark = reading
-            .mark(experiment, self.member.model, self.metric.name)
-            .with("factor", self.factor.name)
-            .number("dose", Some(dose))
-            .number("low", interval.map(|interval| interval.low))
-            .number("high", interval.map(|interval| interval.high));
-        let stroke = Stroke::solid(self.member.style.color, 1.0);
+    for (dose, reading, (x, y)) in points {
+        let bounds = reading.wilson();
+        let mark = reading.mark().with("factor", factor.name).number("dose", Some(dose)).interval(bounds);
         sheet.mark(&mark, |sheet| {
-            if let Some(Interval { low, high }) = interval {
-                sheet.line(&[(x, plot.at(0.0, low).1), (x, plot.at(0.0, high).1)], stroke);
+            if let Some(bounds) = bounds {
+                let ends = [bounds.low, bounds.high].map(|share| (x, plot.y(share)));
+                sheet.line(&ends, Stroke::solid(member.style.color, 1.0));
             }
-            marker::draw(sheet, (x, y), 3.0, self.member.style);
+            marker::draw(sheet, (x, y), 3.0, member.style);
         });
     }
 }

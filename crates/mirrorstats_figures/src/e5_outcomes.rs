@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use crate::kit::lettering::NAME_ROOM;
 use crate::kit::{
-    Fill, Frame, Lettering, MARGIN, Mark, PALETTE, Plot, Sheet, Swatch, TextAnchor, Tick, label, legend, lettering,
-    many, text_on, tiles,
+    Fill, Frame, Lettering, MARGIN, Mark, PALETTE, Plot, Sheet, Swatch, TextAnchor, label, legend, lettering, many,
+    plot, text_on, tiles,
 };
 use crate::{Drawn, Scene};
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
@@ -21,7 +22,7 @@ pub struct Outcomes {
     pub rows: Vec<OutcomeRow>,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OutcomeRow {
     pub model: String,
     /// Episodes whose final self-attribution is the body's colour.
@@ -43,7 +44,7 @@ impl Outcomes {
         let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
         let all = episodes.keys.iter().zip(success.iter()).zip(answered);
         for ((key, value), answered) in all.filter(|((key, _), _)| key.experiment == experiment) {
-            let empty = || OutcomeRow { model: key.model.to_owned(), correct: 0, wrong: 0, uncommitted: 0 };
+            let empty = || OutcomeRow { model: key.model.to_owned(), ..OutcomeRow::default() };
             let row = rows.entry(key.model).or_insert_with(empty);
             match (value, answered) {
                 (Some(1), _) => row.correct += 1,
@@ -87,15 +88,14 @@ impl OutcomeRow {
 
 pub(crate) fn draw(scene: Scene<'_>, outcomes: &Outcomes) -> Drawn {
     let names = scene.roster.names();
-    let (labels, label_width) = tiles::row_labels(&names, scene.name_room());
+    let (labels, label_width) = scene.row_labels(NAME_ROOM);
     let left = MARGIN + label_width + 8.0;
     let width = (left + PLOT_WIDTH + 40.0 + MARGIN).max(LEAST_WIDTH).min(scene.width);
     let mut sheet = Sheet::new(width);
     let frame = Frame::new(left, MARGIN, width - left - MARGIN - 40.0, ROW * many(names.len()));
     let plot = Plot::new(frame, 0.0..1.0, 0.0..1.0);
-    let tick = |(at, text): (f64, &str)| Tick { at, text: text.to_owned() };
-    plot.x_axis(&mut sheet, &[(0.0, "0"), (0.25, ""), (0.5, "50 %"), (0.75, ""), (1.0, "100 %")].map(tick));
-    plot.x_title(&mut sheet, &format!("episodes of {}", label::cut(&outcomes.experiment, 120.0, lettering::label())));
+    let title = format!("episodes of {}", label::cut(&outcomes.experiment, 120.0, lettering::label()));
+    plot.x_axis(&mut sheet, &plot::quarters("0", "50 %", "100 %"), &title);
     for (row, (model, label)) in names.iter().zip(&labels).enumerate() {
         let middle = MARGIN + ROW * (many(row) + 0.5);
         sheet.text((MARGIN, middle), label, lettering::label());
@@ -114,7 +114,7 @@ pub(crate) fn draw(scene: Scene<'_>, outcomes: &Outcomes) -> Drawn {
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 fn bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, row: &OutcomeRow, middle: f64) {
     let episodes = row.episodes();
-    let place = |count: u64| plot.at(count as f64 / episodes as f64, 0.0).0;
+    let place = |count: u64| plot.x(count as f64 / episodes as f64);
     let mut before = 0;
     for (name, count, fill) in row.parts() {
         let (from, to) = (place(before), place(before + count));
@@ -133,7 +133,7 @@ fn bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, row: &OutcomeRow, middl
             }
         });
     }
-    let right = sheet.width() - MARGIN;
+    let right = sheet.width - MARGIN;
     sheet.text((right, middle), &format!("n = {episodes}"), lettering::tick().aligned(TextAnchor::End));
 }
 
@@ -149,7 +149,7 @@ fn episodes_of<'a>(outcomes: &'a Outcomes, model: &str) -> Option<&'a OutcomeRow
 }
 
 fn part_signs() -> impl Iterator<Item = (Swatch, String)> {
-    let row = OutcomeRow { model: String::new(), correct: 0, wrong: 0, uncommitted: 0 };
     let words = ["correct", "wrong, committed", "unknown or not committed"];
-    row.parts().into_iter().zip(words).map(|((_, _, fill), text)| (Swatch::Tile(fill), text.to_owned()))
+    let parts = OutcomeRow::default().parts().into_iter().zip(words);
+    parts.map(|((_, _, fill), text)| (Swatch::Tile(fill), text.to_owned()))
 }

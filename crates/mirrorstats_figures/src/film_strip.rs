@@ -1,7 +1,7 @@
 //! The paper's qualitative figure: frames of one episode in a row, with the action and claim at each, and its moments.
 
 use crate::Figure;
-use crate::kit::{Fill, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, Stroke, label, lettering};
+use crate::kit::{Fill, Frame, MARGIN, Mark, PALETTE, Rgb, Sheet, Stroke, label, lettering, many};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Still {
@@ -23,11 +23,9 @@ const GAP: f64 = 6.0;
 const LINE: f64 = 15.0;
 
 pub fn film_strip(title: &str, stills: &[Still]) -> Figure {
-    let count = stills.len().max(1);
-    #[expect(clippy::cast_precision_loss, reason = "a strip has few frames")]
-    let count = count as f64;
     let heading = lettering::heading();
-    let width = (2.0 * MARGIN + count * (WIDTH + GAP) - GAP).max(2.0 * MARGIN + heading.width(title));
+    let frames = many(stills.len().max(1)) * (WIDTH + GAP) - GAP;
+    let width = (2.0 * MARGIN + frames).max(2.0 * MARGIN + heading.width(title));
     let mut sheet = Sheet::new(width);
     let mut y = MARGIN + LINE / 2.0;
     sheet.text((MARGIN, y), title, heading);

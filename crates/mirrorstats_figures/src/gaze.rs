@@ -1,8 +1,8 @@
 //! `gaze`: a raster of episodes by steps: the mirror in view, its first sight, claim and decision.
 
 use crate::kit::{
-    Arrangement, Fill, Frame, MARGIN, Mark, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, leading, legend, lettering,
-    many, panels, tiles, whole_ticks,
+    Fill, Frame, Grid, MARGIN, Mark, PALETTE, Plot, ROOM_BELOW, Sheet, Stroke, Swatch, leading, legend, lettering,
+    many, tiles, whole_ticks,
 };
 use crate::{Drawn, Scene};
 use mirrorstats_exact::format::counted;
@@ -23,15 +23,11 @@ const LEAST_PANEL: f64 = 70.0;
 pub(crate) fn draw(scene: Scene<'_>, timelines: &[Timeline]) -> Drawn {
     let raster = Raster::new(scene, timelines);
     let matrix = scene.matrix;
-    let (labels, label_width) = tiles::row_labels(&scene.roster.names(), NAMES.min(scene.name_room()));
-    let left = MARGIN + label_width + 10.0;
-    let room = scene.width - MARGIN - left;
-    let columns = panels::fitting(matrix.experiments.len(), MOST_COLUMNS, room, [LEAST_PANEL, GAP]);
-    let height = raster.height() + 28.0;
-    let arranged = Arrangement { left, columns, height, gap: GAP };
-    let panels = Panels::new(&matrix.experiments, &[], scene.width, arranged);
-    let mut sheet = panels.sheet(scene.width);
-    for first in panels.bodies.iter().step_by(columns) {
+    let (labels, label_width) = scene.row_labels(NAMES);
+    let grid = Grid { width: scene.width, left: MARGIN + label_width + 10.0, gap: GAP, columns: MOST_COLUMNS };
+    let grid = grid.at_least(LEAST_PANEL).balanced(matrix.experiments.len());
+    let (mut sheet, panels) = grid.panels(&matrix.experiments, &[], raster.height() + ROOM_BELOW);
+    for first in panels.bodies.iter().step_by(grid.columns) {
         for (block, text) in labels.iter().enumerate() {
             let (top, height) = raster.block(block);
             sheet.text((MARGIN, first.top + top + height / 2.0), text, lettering::label());
@@ -101,8 +97,7 @@ impl<'a> Raster<'a> {
     fn panel(&self, sheet: &mut Sheet, experiment: &str, body: Frame) {
         let frame = Frame { height: self.height(), ..body };
         let plot = Plot::new(frame, 0.0..f64::from(self.last), 0.0..1.0);
-        plot.x_axis(sheet, &whole_ticks(self.last, 4));
-        plot.x_title(sheet, "step t");
+        plot.x_axis(sheet, &whole_ticks(self.last, 4), "step t");
         for (at, member) in self.scene.roster.0.iter().enumerate() {
             let (top, height) = self.block(at);
             let episodes = self.episodes(experiment, member.model);
@@ -120,8 +115,7 @@ impl<'a> Raster<'a> {
     fn episode(&self, sheet: &mut Sheet, plot: &Plot, timeline: &Timeline, top: f64) {
         let gaze = &PALETTE.gaze;
         let height = if self.row > 3.0 { self.row - 0.8 } else { self.row * 0.85 };
-        let ends =
-            |from: u32, to: u32| (plot.at(f64::from(from.saturating_sub(1)), 0.0).0, plot.at(f64::from(to), 0.0).0);
+        let ends = |from: u32, to: u32| (plot.x(f64::from(from.saturating_sub(1))), plot.x(f64::from(to)));
         sheet.mark(&mark(timeline), |sheet| {
             sheet.bars(&[ends(1, timeline.length)], top, height, gaze.episode);
             let runs = timeline.visible.iter().map(|run| ends(*run.start(), (*run.end()).min(timeline.length)));
@@ -130,12 +124,12 @@ impl<'a> Raster<'a> {
             let radius = (height * 0.62).clamp(1.1, 2.4);
             for (step, color) in [(timeline.first_sight, gaze.first_sight), (timeline.claim, gaze.claim)] {
                 if let Some(step) = step {
-                    let x = plot.at(f64::from(step) - 0.5, 0.0).0;
+                    let x = plot.x(f64::from(step) - 0.5);
                     sheet.circle((x, middle), radius, Fill::plain(color));
                 }
             }
             if let Some(step) = timeline.decision {
-                let x = plot.at(f64::from(step), 0.0).0;
+                let x = plot.x(f64::from(step));
                 sheet.rectangle(Frame::new(x - 1.6, top, 1.6, height), Fill::plain(gaze.decision));
             }
         });

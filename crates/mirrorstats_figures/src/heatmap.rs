@@ -1,10 +1,10 @@
 //! `heatmap`: models by experiments and metrics; the colour shows how good the mean is, the number is the mean.
 
+use crate::kit::lettering::NAME_ROOM;
 use crate::kit::{
-    Arrangement, Frame, Lettering, MARGIN, PALETTE, Panels, Sheet, TextAnchor, label, leading, legend, lettering, many,
-    panels, tiles,
+    Frame, Grid, Lettering, MARGIN, PALETTE, Sheet, TextAnchor, label, leading, legend, lettering, many, tiles,
 };
-use crate::matrix::{MetricId, Reading};
+use crate::matrix::{MetricId, Reading, Value};
 use crate::{Drawn, Scene, missing};
 use mirrorstats_metric::catalogs::catalog::Kind;
 
@@ -17,22 +17,20 @@ const MOST_BLOCKS: usize = 8;
 const LEAST_WIDTH: f64 = 430.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    let Scene { matrix, roster, metrics, width: all } = scene;
-    let (labels, label_width) = tiles::row_labels(&roster.names(), scene.name_room());
+    let Scene { matrix, metrics, width: all, .. } = scene;
+    let (labels, label_width) = scene.row_labels(NAME_ROOM);
     let left = MARGIN + label_width + 8.0;
-    let room = all - MARGIN - left;
-    let least = many(metrics.len()) * LEAST_CELL;
-    let columns = panels::fitting(matrix.experiments.len(), MOST_BLOCKS, room, [least, BLOCK_GAP]);
-    let cell = (room - BLOCK_GAP * many(columns - 1)) / many((columns * metrics.len()).max(1));
-    let cell = cell.clamp(LEAST_CELL, WIDEST_CELL);
-    let blocks_width = cell * many(columns * metrics.len()) + BLOCK_GAP * many(columns - 1);
+    let grid = Grid { width: all, left, gap: BLOCK_GAP, columns: MOST_BLOCKS };
+    let grid = grid.at_least(many(metrics.len()) * LEAST_CELL).balanced(matrix.experiments.len());
+    let (gaps, cells) = (BLOCK_GAP * many(grid.columns - 1), many((grid.columns * metrics.len()).max(1)));
+    let cell = ((all - MARGIN - left - gaps) / cells).clamp(LEAST_CELL, WIDEST_CELL);
+    let width = left + (cell * cells + gaps) + MARGIN;
     let head = Head::new(metrics, cell);
     let height = head.height + ROW * many(labels.len());
-    let arranged = Arrangement { left, columns, height, gap: BLOCK_GAP };
-    let width = left + blocks_width + MARGIN;
-    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), width, arranged);
-    let mut sheet = panels.sheet(width.max(LEAST_WIDTH.min(all)));
-    for first in panels.bodies.iter().step_by(columns) {
+    let titles = matrix.titles(&matrix.experiments);
+    let (mut sheet, panels) = Grid { width, ..grid }.panels(&matrix.experiments, &titles, height);
+    sheet.width = width.max(LEAST_WIDTH.min(all));
+    for first in panels.bodies.iter().step_by(grid.columns) {
         for (row, label) in labels.iter().enumerate() {
             sheet.text((MARGIN, first.top + head.height + ROW * (many(row) + 0.5)), label, lettering::label());
         }
@@ -49,7 +47,7 @@ fn draw_key(sheet: &mut Sheet, scene: Scene<'_>, top: f64) -> f64 {
     let Scene { matrix, metrics, .. } = scene;
     let scale = tiles::scale(sheet, (MARGIN, top), |share| PALETTE.ramp.goodness.at(share), ["worse", "better"]);
     let readings = matrix.pairs().flat_map(|(e, m)| metrics.iter().map(move |metric| matrix.reading(e, m, *metric)));
-    legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings)).max(top + 14.0) + MARGIN
+    legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings, missing::TILES)).max(top + 14.0) + MARGIN
 }
 
 /// The names of the metrics above their columns; vertical if a column is too narrow for any of them.
@@ -63,7 +61,7 @@ impl<'a> Head<'a> {
     fn new(metrics: &'a [MetricId<'a>], cell: f64) -> Self {
         const TALLEST: f64 = 60.0;
         let level = lettering::tick().aligned(TextAnchor::Middle);
-        let widest = metrics.iter().map(|metric| level.width(metric.name)).fold(0.0, f64::max);
+        let widest = level.widest(metrics.iter().map(|metric| metric.name));
         if widest <= cell {
             return Self { metrics, lettering: level, height: leading(level) + 2.0 };
         }
@@ -94,8 +92,8 @@ fn draw_block(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, body: Frame
             let frame = Frame::new(left, top, cell, ROW).inset(0.5);
             let reading = matrix.reading(experiment, member.model, metric);
             let color = matrix.goodness(experiment, member.model, metric).map(|share| PALETTE.ramp.goodness.at(share));
-            sheet.mark(&reading.mark(experiment, member.model, metric.name), |sheet| match (reading, color) {
-                (Reading::Empty, _) => tiles::empty(sheet, frame),
+            sheet.mark(&reading.mark(), |sheet| match (reading.value, color) {
+                (Value::Empty, _) => tiles::empty(sheet, frame),
                 (_, None) => tiles::undefined(sheet, frame),
                 (_, Some(color)) => tiles::known(sheet, frame, color, &texts(reading, metric)),
             });
@@ -103,7 +101,7 @@ fn draw_block(sheet: &mut Sheet, scene: Scene<'_>, experiment: &str, body: Frame
     }
 }
 
-fn texts(reading: Reading, metric: MetricId<'_>) -> Vec<String> {
+fn texts(reading: Reading<'_>, metric: MetricId<'_>) -> Vec<String> {
     let places: &[u32] = match metric.metric.kind {
         Kind::Rate => &[2, 1],
         Kind::Quantity => &[1, 0],

@@ -1,58 +1,51 @@
 //! `intervals`: a rate of each model with its 95 % interval, counts and the level of chance, per experiment.
 
+use crate::kit::lettering::NAME_ROOM;
 use crate::kit::{
-    Arrangement, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, TextAnchor, legend,
-    lettering, many, marker, panels, rate_ticks, tiles,
+    Frame, Grid, MARGIN, Mark, PALETTE, Plot, ROOM_BELOW, Sheet, Stroke, Swatch, TextAnchor, legend, lettering, many,
+    marker, rate_ticks,
 };
-use crate::matrix::{MetricId, Reading};
-use crate::{Drawn, Scene};
+use crate::matrix::{MetricId, Reading, Value};
+use crate::{Drawn, Scene, missing};
 use mirrorstats_exact::number;
-use mirrorstats_statistics::intervals::interval::Interval;
 
 const ROW: f64 = 18.0;
 const MOST_COLUMNS: usize = 5;
 const LEAST_PANEL: f64 = 80.0;
 const GAP: f64 = 12.0;
-const AXIS_BELOW: f64 = 28.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
     let Scene { matrix, roster, metrics, width } = scene;
     let metric = metrics[0];
-    let (labels, label_width) = tiles::row_labels(&roster.names(), scene.name_room());
+    let (labels, label_width) = scene.row_labels(NAME_ROOM);
     let left = MARGIN + label_width + 22.0;
-    let room = width - MARGIN - left;
-    let columns = panels::fitting(matrix.experiments.len(), MOST_COLUMNS, room, [LEAST_PANEL, GAP]);
+    let grid = Grid { width, left, gap: GAP, columns: MOST_COLUMNS };
+    let grid = grid.at_least(LEAST_PANEL).balanced(matrix.experiments.len());
     let rows_height = ROW * many(labels.len());
-    let arranged = Arrangement { left, columns, height: rows_height + AXIS_BELOW, gap: GAP };
-    let panels = Panels::new(&matrix.experiments, &[], width, arranged);
-    let mut sheet = panels.sheet(width);
-    for first in panels.bodies.iter().step_by(columns) {
+    let (mut sheet, panels) = grid.panels(&matrix.experiments, &[], rows_height + ROOM_BELOW);
+    for first in panels.bodies.iter().step_by(grid.columns) {
         for (row, (member, label)) in roster.0.iter().zip(&labels).enumerate() {
             let middle = first.top + ROW * (many(row) + 0.5);
             sheet.text((MARGIN, middle), label, lettering::label());
             marker::draw(&mut sheet, (left - 10.0, middle), 3.0, member.style);
         }
     }
-    let counts = counts_width(scene, metric);
+    let counts = matrix.pairs().map(|(e, m)| counts(matrix.reading(e, m, metric)));
+    let counts = lettering::tick().widest(counts);
     for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
         let frame = Frame { width: body.width - counts - 8.0, height: rows_height, ..*body };
         let plot = Plot::new(frame, -0.02..1.02, 0.0..1.0);
-        Panel { scene, experiment, metric, plot, right: body.right() }.draw(&mut sheet);
+        panel(&mut sheet, &plot, scene, experiment, body.right());
     }
     let bottom = legend::draw_signs(&mut sheet, (MARGIN, panels.bottom + 8.0), signs(scene, metric));
     (sheet, bottom + MARGIN)
 }
 
-fn counts_width(scene: Scene<'_>, metric: MetricId<'_>) -> f64 {
-    let texts = scene.matrix.pairs().map(|(e, m)| counts(scene.matrix.reading(e, m, metric)));
-    texts.map(|text| lettering::tick().width(&text)).fold(0.0, f64::max)
-}
-
-fn counts(reading: Reading) -> String {
-    match reading {
-        Reading::Empty => "none".to_owned(),
-        Reading::Undefined(_) => "--".to_owned(),
-        Reading::Known(moments) => format!("{}/{}", moments.sum, moments.n),
+fn counts(reading: Reading<'_>) -> String {
+    match reading.value {
+        Value::Empty => "none".to_owned(),
+        Value::Undefined(_) => "--".to_owned(),
+        Value::Known { moments, .. } => format!("{}/{}", moments.sum, moments.n),
     }
 }
 
@@ -69,11 +62,9 @@ fn signs(scene: Scene<'_>, metric: MetricId<'_>) -> Vec<(Swatch, String)> {
             signs.push((Swatch::Rule(reference_rule()), words));
         }
     }
-    let readings: Vec<_> = matrix.pairs().map(|(e, m)| matrix.reading(e, m, metric)).collect();
-    let has_empty = readings.iter().any(|reading| matches!(reading, Reading::Empty));
-    let has_undefined = readings.iter().any(|reading| matches!(reading, Reading::Undefined(_)));
-    let words = [(has_empty, "none: no episodes"), (has_undefined, "--: undefined")];
-    signs.extend(words.into_iter().filter(|(is_seen, _)| *is_seen).map(|(_, text)| (Swatch::None, text.to_owned())));
+    let readings = matrix.pairs().map(|(e, m)| matrix.reading(e, m, metric));
+    let absent = missing::signs(readings, [(Swatch::None, "--: undefined"), (Swatch::None, "none: no episodes")]);
+    signs.extend(absent.into_iter().rev());
     signs
 }
 
@@ -85,59 +76,36 @@ fn reference_rule() -> Stroke {
     Stroke { color: PALETTE.surface.reference, width: 1.0, dash: &[1.0, 2.0] }
 }
 
-struct Panel<'a> {
-    scene: Scene<'a>,
-    experiment: &'a str,
-    metric: MetricId<'a>,
-    plot: Plot,
-    right: f64,
-}
-
-impl Panel<'_> {
-    fn draw(&self, sheet: &mut Sheet) {
-        self.plot.x_axis(sheet, &rate_ticks());
-        self.plot.x_title(sheet, self.metric.name);
-        let matrix = self.scene.matrix;
-        for (_, level) in matrix.references(self.experiment, self.metric) {
-            self.level(sheet, level, reference_rule(), "reference");
-        }
-        if let Some(level) = matrix.chance(self.experiment, self.metric) {
-            self.level(sheet, level, chance_rule(), "chance");
-        }
-        for (row, member) in self.scene.roster.0.iter().enumerate() {
-            self.row(sheet, *member, self.plot.frame.top + ROW * (many(row) + 0.5));
-        }
-    }
-
-    fn level(&self, sheet: &mut Sheet, level: f64, stroke: Stroke, name: &'static str) {
-        let mark = Mark::new(format!("{}: {name} level {}", self.experiment, number::full_precision(level)))
-            .with("experiment", self.experiment)
+fn panel(sheet: &mut Sheet, plot: &Plot, scene: Scene<'_>, experiment: &str, right: f64) {
+    let (matrix, metric, frame) = (scene.matrix, scene.metrics[0], plot.frame);
+    plot.x_axis(sheet, &rate_ticks(), metric.name);
+    let references = matrix.references(experiment, metric).into_iter();
+    let references = references.map(|(_, level)| (level, reference_rule(), "reference"));
+    let chance = matrix.chance(experiment, metric).map(|level| (level, chance_rule(), "chance"));
+    for (level, stroke, name) in references.chain(chance) {
+        let mark = Mark::new(format!("{experiment}: {name} level {}", number::full_precision(level)))
+            .with("experiment", experiment)
             .number(name, Some(level));
-        let x = self.plot.at(level, 0.0).0;
-        let frame = self.plot.frame;
+        let x = plot.x(level);
         sheet.mark(&mark, |sheet| sheet.line(&[(x, frame.top), (x, frame.bottom())], stroke));
     }
-
-    fn row(&self, sheet: &mut Sheet, member: Member<'_>, middle: f64) {
-        let reading = self.scene.matrix.reading(self.experiment, member.model, self.metric);
-        let interval = reading.wilson();
-        let mark = reading
-            .mark(self.experiment, member.model, self.metric.name)
-            .number("low", interval.map(|interval| interval.low))
-            .number("high", interval.map(|interval| interval.high));
+    for (row, member) in scene.roster.0.iter().enumerate() {
+        let middle = frame.top + ROW * (many(row) + 0.5);
+        let reading = matrix.reading(experiment, member.model, metric);
+        let bounds = reading.wilson();
         let stroke = Stroke::solid(member.style.color, 1.6);
-        sheet.mark(&mark, |sheet| {
-            if let Some(Interval { low, high }) = interval {
-                let x = |share| self.plot.at(share, 0.0).0;
-                sheet.line(&[(x(low), middle), (x(high), middle)], stroke);
-                for end in [x(low), x(high)] {
+        sheet.mark(&reading.mark().interval(bounds), |sheet| {
+            if let Some(bounds) = bounds {
+                let ends = [bounds.low, bounds.high].map(|share| plot.x(share));
+                sheet.line(&ends.map(|x| (x, middle)), stroke);
+                for end in ends {
                     sheet.line(&[(end, middle - 3.0), (end, middle + 3.0)], stroke);
                 }
             }
             if let Some(mean) = reading.mean() {
-                marker::draw(sheet, (self.plot.at(mean, 0.0).0, middle), 3.2, member.style);
+                marker::draw(sheet, (plot.x(mean), middle), 3.2, member.style);
             }
-            sheet.text((self.right, middle), &counts(reading), lettering::tick().aligned(TextAnchor::End));
+            sheet.text((right, middle), &counts(reading), lettering::tick().aligned(TextAnchor::End));
         });
     }
 }

@@ -6,6 +6,8 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+#[cfg(feature = "raster")]
+pub mod contact_sheet;
 pub mod e5_outcomes;
 pub mod film_strip;
 pub mod gaze;
@@ -16,6 +18,7 @@ mod completion_gap;
 mod decision_curve;
 mod dose_response;
 mod error;
+mod figure;
 mod heatmap;
 mod intervals;
 mod matrix;
@@ -26,19 +29,18 @@ mod spider;
 mod width;
 
 pub use error::FigureError;
-#[cfg(feature = "raster")]
-pub use kit::convert::ConvertError;
-pub use kit::font::style_sheet as font_style_sheet;
-pub use kit::picture::{EncodeError, Figure, FigureFormat, UnknownEnding};
+pub use figure::{EncodeError, Figure, FigureFormat, UnknownEnding};
+pub use kit::lettering::style_sheet as font_style_sheet;
+pub use shown::FigureName;
 pub use width::{FigureWidth, InvalidWidth};
 
 use e5_outcomes::Outcomes;
-use kit::{FULL_WIDTH, NAME_ROOM, Roster, Sheet};
+use kit::lettering::FULL_WIDTH;
+use kit::{Roster, Sheet, label, lettering};
 use matrix::{Matrix, MetricId};
 use mirrorstats_score::cells::Cells;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::timeline::Timeline;
-pub use shown::FigureName;
 use shown::{FigureSheets, SHOWN};
 
 #[derive(Clone, Copy, Debug)]
@@ -87,15 +89,15 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
         }
         FigureName::Gaze => {
             let found = input.episodes.map_or(0, EpisodeTable::len);
-            let most = gaze::MOST_EPISODES;
-            if input.timelines.is_none() && found > most {
-                return Err(FigureError::TooManyEpisodes { figure: name, most, found });
-            }
-            gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?)
+            let timelines = input.timelines.ok_or_else(|| match gaze::MOST_EPISODES {
+                most if found > most => FigureError::TooManyEpisodes { figure: name, most, found },
+                _ => missing("the steps of each episode"),
+            });
+            gaze::draw(scene, timelines?)
         }
     };
     let too_narrow = |least| FigureError::TooNarrow { figure: name, least };
-    let printed = input.width.map(|width| width.printed(sheet.width()).map_err(too_narrow)).transpose()?;
+    let printed = input.width.map(|width| width.printed(sheet.width).map_err(too_narrow)).transpose()?;
     let title = shown::title(name, &metrics, matrix.catalog());
     let mut figure = Figure::new(sheet, height, &title, shown::caption(name, &metrics, input.sheets));
     figure.models = matrix.models.len();
@@ -112,8 +114,12 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    fn name_room(&self) -> f64 {
-        NAME_ROOM.min(self.width / 3.0)
+    /// The names of the models in at most `room` px, and the width of the widest.
+    fn row_labels(&self, room: f64) -> (Vec<String>, f64) {
+        let lettering = lettering::label();
+        let labels = label::fitted(&self.roster.names(), room.min(self.width / 3.0), lettering);
+        let width = lettering.widest(&labels);
+        (labels, width)
     }
 }
 

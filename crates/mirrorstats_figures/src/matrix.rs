@@ -13,56 +13,69 @@ use mirrorstats_statistics::intervals::interval::{self, Interval};
 
 const CONFIDENCE: f64 = 0.95;
 
+/// One metric of a model in an experiment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reading<'a> {
+    experiment: &'a str,
+    model: &'a str,
+    metric: MetricId<'a>,
+    pub value: Value,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reading {
+pub(crate) enum Value {
     /// There are no episodes of this model in this experiment.
     Empty,
     /// The number of episodes; the metric is undefined in all of them.
     Undefined(u64),
-    Known(Moments),
+    Known {
+        moments: Moments,
+        /// True if a scene, cluster or participant has several of the episodes.
+        repeats: bool,
+    },
 }
 
-impl Reading {
-    pub fn mean(self) -> Option<f64> {
-        self.moments().and_then(Moments::mean)
+impl Reading<'_> {
+    pub(crate) fn moments(self) -> Option<Moments> {
+        if let Value::Known { moments, .. } = self.value { Some(moments) } else { None }
     }
 
-    pub fn n(self) -> u64 {
+    pub(crate) fn mean(self) -> Option<f64> {
+        self.metric.metric.mean(&self.moments()?)
+    }
+
+    pub(crate) fn n(self) -> u64 {
         self.moments().map_or(0, |moments| moments.n)
     }
 
-    pub fn moments(self) -> Option<Moments> {
-        match self {
-            Self::Known(moments) => Some(moments),
-            Self::Empty | Self::Undefined(_) => None,
-        }
-    }
-
-    /// The 95 % interval of a rate.
+    /// The 95 % interval of a rate; `None` for repeats, which are not independent.
     pub(crate) fn wilson(self) -> Option<Interval> {
-        let moments = self.moments()?;
+        let Value::Known { moments, repeats: false } = self.value else { return None };
         interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE)
     }
 
     /// The mean with `places` decimal places, correctly rounded from the exact fraction.
     pub(crate) fn decimal(self, places: u32) -> Option<Decimal> {
         let moments = self.moments()?;
-        Decimal::of_ratio(moments.sum, i128::from(moments.n), places)
+        let below = i128::from(moments.n) * i128::from(self.metric.metric.scale());
+        Decimal::of_ratio(moments.sum, below, places)
     }
 
     /// The value as shown on hover: the full mean and its components.
-    pub fn words(self) -> String {
-        match self {
-            Self::Empty => "no episodes".to_owned(),
-            Self::Undefined(episodes) => format!("undefined (0 of {})", counted(episodes, "episode")),
-            Self::Known(moments) => {
+    pub(crate) fn words(self) -> String {
+        match self.value {
+            Value::Empty => "no episodes".to_owned(),
+            Value::Undefined(episodes) => format!("undefined (0 of {})", counted(episodes, "episode")),
+            Value::Known { moments, .. } => {
                 let mean = self.decimal(4).map(|mean| mean.to_string()).unwrap_or_default();
-                format!("{mean} ({}/{n}, n = {n})", moments.sum, n = moments.n)
+                let [sum, _] = self.metric.metric.sums(&moments);
+                format!("{mean} ({sum}/{n}, n = {n})", n = moments.n)
             }
         }
     }
 
-    pub fn mark(self, experiment: &str, model: &str, metric: &str) -> Mark {
+    pub(crate) fn mark(self) -> Mark {
+        let Self { experiment, model, metric: MetricId { name: metric, .. }, .. } = self;
         let title = format!("{experiment} · {model} · {metric}: {}", self.words());
         Mark::of_cell(title, experiment, model, metric).value(self.mean()).with("n", self.n())
     }
@@ -107,8 +120,7 @@ impl<'a> Matrix<'a> {
     }
 
     pub(crate) fn metric(&self, figure: FigureName, name: &str) -> Result<MetricId<'a>, FigureError> {
-        let found = self.cells.metrics.iter().position(|metric| metric == name).and_then(|at| self.metric_at(at));
-        found.ok_or_else(|| FigureError::UnknownMetric {
+        self.metrics().into_iter().find(|id| id.name == name).ok_or_else(|| FigureError::UnknownMetric {
             figure,
             metric: name.to_owned(),
             known: self.cells.metrics.join(", "),
@@ -120,20 +132,21 @@ impl<'a> Matrix<'a> {
     }
 
     pub(crate) fn metrics(&self) -> Vec<MetricId<'a>> {
-        (0..self.cells.metrics.len()).filter_map(|at| self.metric_at(at)).collect()
+        let names = self.cells.metrics.iter().enumerate();
+        names
+            .filter_map(|(at, name)| Some(MetricId { name, at, metric: self.cells.catalog.metric.get(name)? }))
+            .collect()
     }
 
-    fn metric_at(&self, at: usize) -> Option<MetricId<'a>> {
-        let name = self.cells.metrics.get(at)?;
-        Some(MetricId { name, at, metric: self.cells.catalog.metric.get(name)? })
-    }
-
-    pub(crate) fn reading(&self, experiment: &str, model: &str, metric: MetricId<'_>) -> Reading {
-        let Some(group) = self.groups.get(&(experiment, model)) else { return Reading::Empty };
-        match group.moments.get(metric.at) {
-            Some(&moments) if moments.n > 0 => Reading::Known(moments),
-            _ => Reading::Undefined(group.episodes),
-        }
+    pub(crate) fn reading<'r>(&self, experiment: &'r str, model: &'r str, metric: MetricId<'r>) -> Reading<'r> {
+        let value = match self.groups.get(&(experiment, model)) {
+            None => Value::Empty,
+            Some(group) => match group.moments.get(metric.at) {
+                Some(&moments) if moments.n > 0 => Value::Known { moments, repeats: group.repeats },
+                _ => Value::Undefined(group.episodes),
+            },
+        };
+        Reading { experiment, model, metric, value }
     }
 
     /// The mean on a scale from 0 (worst) to 1 (best); `None` without a mean.

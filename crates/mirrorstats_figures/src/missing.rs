@@ -1,7 +1,8 @@
 //! Missing values, with the reason: no episodes, or an undefined metric.
 
-use super::kit::{Member, Point, Roster, Sheet, Swatch, leading, lettering, marker};
-use super::matrix::{Matrix, MetricId, Reading};
+use crate::Scene;
+use crate::kit::{Member, Point, Sheet, Swatch, leading, lettering, marker};
+use crate::matrix::{MetricId, Reading, Value};
 
 const MARKER_ROOM: f64 = 10.0;
 const RUN_GAP: f64 = 8.0;
@@ -9,36 +10,45 @@ const RUN_GAP: f64 = 8.0;
 /// The models that a panel cannot show: words and markers in lines, positioned from the top left corner.
 #[derive(Clone, Debug)]
 pub(crate) struct Strip<'a> {
-    experiment: &'a str,
     words: Vec<(Point, String)>,
     markers: Vec<(Point, Absent<'a>)>,
     /// The height of the lines, px; 0 if no model is absent.
     pub height: f64,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Absent<'a> {
-    member: Member<'a>,
-    metric: &'a str,
-    reading: Reading,
-}
+/// A model and its missing value.
+type Absent<'a> = (Member<'a>, Reading<'a>);
 
 impl<'a> Strip<'a> {
-    /// The models of `roster` without a mean of one of `metrics` in `experiment`, in lines of `width` px.
-    pub(crate) fn new(
-        matrix: &Matrix<'_>,
-        roster: &Roster<'a>,
-        experiment: &'a str,
-        metrics: &[MetricId<'a>],
-        width: f64,
-    ) -> Self {
-        let mut strip = Self { experiment, words: Vec::new(), markers: Vec::new(), height: 0.0 };
-        let mut place = (0.0, leading(lettering::tick()) / 2.0);
-        for (word, absent) in runs(matrix, roster, experiment, metrics) {
-            strip.run(&mut place, width, word, absent);
-        }
-        if !strip.words.is_empty() {
-            strip.height = place.1 + leading(lettering::tick()) / 2.0;
+    /// The strips of all experiments, and the height of the highest.
+    pub(crate) fn of_experiments(scene: Scene<'a>, metrics: &[MetricId<'a>], width: f64) -> (Vec<Self>, f64) {
+        let strips = scene.matrix.experiments.iter().map(|e| Self::new(scene, e, metrics, width));
+        let strips: Vec<Self> = strips.collect();
+        let height = strips.iter().map(|strip| strip.height).fold(0.0, f64::max);
+        (strips, height)
+    }
+
+    /// The models without a mean of one of `metrics` in `experiment`, in lines of `width` px.
+    pub(crate) fn new(scene: Scene<'a>, experiment: &'a str, metrics: &[MetricId<'a>], width: f64) -> Self {
+        let mut strip = Self { words: Vec::new(), markers: Vec::new(), height: 0.0 };
+        let line = leading(lettering::tick());
+        let (mut x, mut y) = (0.0, line / 2.0);
+        for (word, absent) in runs(scene, experiment, metrics) {
+            let word_width = lettering::tick().width(&word) + 3.0;
+            if x > 0.0 && x + word_width + MARKER_ROOM > width {
+                (x, y) = (0.0, y + line);
+            }
+            strip.words.push(((x, y), word));
+            x += word_width;
+            for absent in absent {
+                if x + MARKER_ROOM > width {
+                    (x, y) = (0.0, y + line);
+                }
+                strip.markers.push(((x + MARKER_ROOM / 2.0, y), absent));
+                x += MARKER_ROOM;
+            }
+            x += RUN_GAP;
+            strip.height = y + line / 2.0;
         }
         strip
     }
@@ -47,40 +57,28 @@ impl<'a> Strip<'a> {
         for ((x, y), word) in &self.words {
             sheet.text((corner.0 + x, corner.1 + y), word, lettering::tick());
         }
-        for ((x, y), absent) in &self.markers {
-            let mark = absent.reading.mark(self.experiment, absent.member.model, absent.metric);
-            sheet.mark(&mark, |sheet| marker::draw(sheet, (corner.0 + x, corner.1 + y), 2.8, absent.member.style));
+        for ((x, y), (member, reading)) in &self.markers {
+            let place = (corner.0 + x, corner.1 + y);
+            sheet.mark(&reading.mark(), |sheet| marker::draw(sheet, place, 2.8, member.style));
         }
-    }
-
-    fn run(&mut self, place: &mut Point, width: f64, word: String, absent: Vec<Absent<'a>>) {
-        let line = leading(lettering::tick());
-        let word_width = lettering::tick().width(&word) + 3.0;
-        let fresh = place.0 == 0.0;
-        if !fresh && place.0 + word_width + MARKER_ROOM > width {
-            *place = (0.0, place.1 + line);
-        }
-        self.words.push((*place, word));
-        place.0 += word_width;
-        for absent in absent {
-            if place.0 + MARKER_ROOM > width {
-                *place = (0.0, place.1 + line);
-            }
-            self.markers.push(((place.0 + MARKER_ROOM / 2.0, place.1), absent));
-            place.0 += MARKER_ROOM;
-        }
-        place.0 += RUN_GAP;
     }
 }
 
-pub(crate) fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
-    let mut signs = [(Swatch::Undefined, "undefined", false), (Swatch::Empty, "no episodes", false)];
+/// The signs of undefined and of empty cells in a heat map.
+pub(crate) const TILES: [(Swatch, &str); 2] = [(Swatch::Undefined, "undefined"), (Swatch::Empty, "no episodes")];
+
+/// Those of the signs, of undefined and of empty cells, that `readings` need.
+pub(crate) fn signs<'a>(
+    readings: impl Iterator<Item = Reading<'a>>,
+    [undefined, empty]: [(Swatch, &str); 2],
+) -> Vec<(Swatch, String)> {
+    let (mut has_undefined, mut has_empty) = (false, false);
     for reading in readings {
-        signs[0].2 |= matches!(reading, Reading::Undefined(_));
-        signs[1].2 |= matches!(reading, Reading::Empty);
+        has_undefined |= matches!(reading.value, Value::Undefined(_));
+        has_empty |= reading.value == Value::Empty;
     }
-    let seen = signs.into_iter().filter(|(.., is_seen)| *is_seen);
-    seen.map(|(swatch, text, _)| (swatch, text.to_owned())).collect()
+    let seen = [has_undefined.then_some(undefined), has_empty.then_some(empty)].into_iter().flatten();
+    seen.map(|(swatch, text)| (swatch, text.to_owned())).collect()
 }
 
 pub(crate) fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
@@ -88,22 +86,13 @@ pub(crate) fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
     has_any.then(|| (Swatch::None, "--: undefined".to_owned()))
 }
 
-fn runs<'a>(
-    matrix: &Matrix<'_>,
-    roster: &Roster<'a>,
-    experiment: &str,
-    metrics: &[MetricId<'a>],
-) -> Vec<(String, Vec<Absent<'a>>)> {
-    let absent = |metric: MetricId<'a>, is_absent: fn(Reading) -> bool| -> Vec<Absent<'a>> {
-        let read = |member: &Member<'a>| Absent {
-            member: *member,
-            metric: metric.name,
-            reading: matrix.reading(experiment, member.model, metric),
-        };
-        roster.0.iter().map(read).filter(|absent| is_absent(absent.reading)).collect()
+fn runs<'a>(scene: Scene<'a>, experiment: &'a str, metrics: &[MetricId<'a>]) -> Vec<(String, Vec<Absent<'a>>)> {
+    let absent = |metric: MetricId<'a>, is_absent: fn(Value) -> bool| -> Vec<Absent<'a>> {
+        let read = |member: &Member<'a>| (*member, scene.matrix.reading(experiment, member.model, metric));
+        scene.roster.0.iter().map(read).filter(|(_, reading)| is_absent(reading.value)).collect()
     };
-    let is_empty = |reading| matches!(reading, Reading::Empty);
-    let is_undefined = |reading| matches!(reading, Reading::Undefined(_));
+    let is_empty = |value| value == Value::Empty;
+    let is_undefined = |value| matches!(value, Value::Undefined(_));
     let without_episodes = metrics.first().map(|&metric| ("no episodes:".to_owned(), absent(metric, is_empty)));
     let without_value = metrics.iter().map(|&metric| (format!("{} --", metric.name), absent(metric, is_undefined)));
     without_episodes.into_iter().chain(without_value).filter(|(_, absent)| !absent.is_empty()).collect()

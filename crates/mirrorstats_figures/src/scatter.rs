@@ -1,7 +1,7 @@
 //! `scatter`: one rate against another, one point per model and experiment, its size a relative duration.
 
 use crate::kit::{
-    Arrangement, Frame, MARGIN, Mark, PALETTE, Panels, Plot, Sheet, Stroke, Swatch, dodge, legend, marker, panels,
+    Frame, Grid, MARGIN, Mark, PALETTE, Plot, ROOM_BELOW, ROOM_LEFT, Sheet, Stroke, Swatch, dodge, legend, marker,
     rate_ticks,
 };
 use crate::matrix::MetricId;
@@ -14,37 +14,26 @@ const LEAST_PANEL: f64 = 120.0;
 const LARGEST: f64 = 5.6;
 /// The smallest radius of a visible shape, px.
 const SMALLEST: f64 = 2.0;
-const AXIS_ROOM: f64 = 34.0;
-const AXIS_BELOW: f64 = 28.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
     let Scene { matrix, roster, metrics, width: all } = scene;
     let ids = [metrics[0], metrics[1], metrics[2]];
-    let gap = AXIS_ROOM + 8.0;
-    let left = MARGIN + AXIS_ROOM;
-    let (columns, width) = panels::most(MOST_COLUMNS, all - left - MARGIN, [LEAST_PANEL, gap]);
-    let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, &ids[..2], width)).collect();
-    let below = AXIS_BELOW + strips.iter().map(|strip| strip.height).fold(0.0, f64::max);
-    let arranged = Arrangement { left, columns, height: width + below, gap };
-    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), all, arranged);
-    let mut sheet = panels.sheet(all);
+    let grid = Grid { width: all, left: MARGIN + ROOM_LEFT, gap: ROOM_LEFT + 8.0, columns: MOST_COLUMNS };
+    let grid = grid.at_least(LEAST_PANEL);
+    let width = grid.panel();
+    let (strips, below) = Strip::of_experiments(scene, &ids[..2], width);
+    let titles = matrix.titles(&matrix.experiments);
+    let (mut sheet, panels) = grid.panels(&matrix.experiments, &titles, width + (ROOM_BELOW + below));
     for ((experiment, body), strip) in matrix.experiments.iter().zip(&panels.bodies).zip(&strips) {
         let plot = Plot::new(Frame { height: width, ..*body }, -0.06..1.06, -0.06..1.06);
-        axes(&mut sheet, &plot, ids);
+        plot.axes(&mut sheet, (&rate_ticks(), ids[0].name), (&rate_ticks(), ids[1].name));
+        sheet.line(&[plot.at(0.0, 0.0), plot.at(1.0, 1.0)], diagonal());
         points(&mut sheet, scene, experiment, ids, &plot);
-        strip.draw(&mut sheet, (body.left, body.top + width + AXIS_BELOW));
+        strip.draw(&mut sheet, (body.left, body.top + width + ROOM_BELOW));
     }
     let signs = signs(ids).into_iter().chain(missing::strip_signs(&strips)).collect();
     let height = legend::around(&mut sheet, roster, &panels, Swatch::Marker, signs);
     (sheet, height)
-}
-
-fn axes(sheet: &mut Sheet, plot: &Plot, [x, y, _]: [MetricId<'_>; 3]) {
-    plot.x_axis(sheet, &rate_ticks());
-    plot.y_axis(sheet, &rate_ticks());
-    plot.x_title(sheet, x.name);
-    plot.y_title(sheet, y.name, 26.0);
-    sheet.line(&[plot.at(0.0, 0.0), plot.at(1.0, 1.0)], diagonal());
 }
 
 fn diagonal() -> Stroke {

@@ -88,39 +88,44 @@ pub const FIGURES: &str = include_str!("../../../assets/styles/figures.toml");
 /// With more axes the labels overlap.
 const MOST_AXES: usize = 8;
 
+/// The fixed properties of a figure.
+struct Spec {
+    title: &'static str,
+    /// The fewest and the most metrics that it shows.
+    metrics: [usize; 2],
+    /// The number of the metrics, from the first on, that must be rates.
+    rates: usize,
+    /// The words for its metrics.
+    needs: &'static str,
+}
+
 impl FigureName {
-    /// The title, for headings and screen readers.
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Spider => "Behavioural profiles",
-            Self::Heatmap => "Performance across experiments and metrics",
-            Self::Scatter => "Task success against self-attribution",
-            Self::CompletionGap => "Completion gap",
-            Self::E5Outcomes => "Final self-identification outcomes",
-            Self::Intervals => "Task success with 95 % intervals",
-            Self::Slopes => "Task success from experiment to experiment",
-            Self::DoseResponse => "Task success against the dose",
-            Self::DecisionCurve => "Share of episodes decided by step t",
-            Self::Gaze => "Mirror in view, episode by episode",
-        }
+    const fn spec(self) -> Spec {
+        const ANY: usize = 64;
+        let (title, metrics, rates, needs) = match self {
+            Self::Spider => ("Behavioural profiles", [3, ANY], 0, "three metrics or more"),
+            Self::Heatmap => ("Performance across experiments and metrics", [1, ANY], 0, "metrics"),
+            Self::Scatter => ("Task success against self-attribution", [3, 3], 2, "two rates and a duration"),
+            Self::CompletionGap => ("Completion gap", [2, 2], 2, "a rate that `completes` another one"),
+            Self::E5Outcomes => ("Final self-identification outcomes", [0, 0], 0, "metrics"),
+            Self::Intervals => ("Task success with 95 % intervals", [1, 1], 1, "a rate"),
+            Self::Slopes => ("Task success from experiment to experiment", [1, 1], 1, "a rate"),
+            Self::DoseResponse => ("Task success against the dose", [1, 1], 1, "a rate"),
+            Self::DecisionCurve => {
+                ("Share of episodes decided by step t", [2, 2], 0, "a duration and the rate that is `finished`")
+            }
+            Self::Gaze => ("Mirror in view, episode by episode", [0, 0], 0, "metrics"),
+        };
+        Spec { title, metrics, rates, needs }
     }
 
-    /// The fewest and the most metrics that the figure shows; the first ones, by this number, must be rates.
-    pub const fn metrics(self) -> ([usize; 2], usize) {
-        const ANY: usize = 64;
-        match self {
-            Self::Spider => ([3, ANY], 0),
-            Self::Heatmap => ([1, ANY], 0),
-            Self::Scatter => ([3, 3], 2),
-            Self::CompletionGap => ([2, 2], 2),
-            Self::Intervals | Self::Slopes | Self::DoseResponse => ([1, 1], 1),
-            Self::DecisionCurve => ([2, 2], 0),
-            Self::E5Outcomes | Self::Gaze => ([0, 0], 0),
-        }
+    /// The title, for headings and screen readers.
+    pub const fn title(self) -> &'static str {
+        self.spec().title
     }
 
     pub fn check_count(self, found: usize) -> Result<(), FigureError> {
-        let ([fewest, most], _) = self.metrics();
+        let [fewest, most] = self.spec().metrics;
         if (fewest..=most).contains(&found) {
             return Ok(());
         }
@@ -129,19 +134,10 @@ impl FigureName {
     }
 
     pub(super) fn needs(self, metric: &str) -> String {
-        let is_built_in = SHOWN.get(self.name()).and_then(|sheet| sheet.metrics.as_ref());
-        if is_built_in.is_none_or(|listed| listed.iter().all(|name| name != metric)) {
-            return format!("the metric {metric}");
+        match SHOWN.get(self.name()).and_then(|sheet| sheet.metrics.as_ref()) {
+            Some(listed) if listed.iter().any(|name| name == metric) => self.spec().needs.to_owned(),
+            _ => format!("the metric {metric}"),
         }
-        match self {
-            Self::Spider => "three metrics or more",
-            Self::Scatter => "two rates and a duration",
-            Self::CompletionGap => "a rate that `completes` another one",
-            Self::DecisionCurve => "a duration and the rate that is `finished`",
-            Self::Intervals | Self::Slopes | Self::DoseResponse => "a rate",
-            Self::Heatmap | Self::E5Outcomes | Self::Gaze => "metrics",
-        }
-        .to_owned()
     }
 }
 
@@ -153,7 +149,7 @@ pub(super) fn metrics<'a>(
     let listed = sheets.get(figure.name()).and_then(|sheet| sheet.metrics.as_deref()).unwrap_or_default();
     let found: Result<Vec<_>, _> = listed.iter().map(|name| matrix.metric(figure, name)).collect();
     let found = found.or_else(|error| instead(figure, matrix, listed).ok_or(error))?;
-    let quantity = found.iter().take(figure.metrics().1).find(|id| id.metric.kind == Kind::Quantity);
+    let quantity = found.iter().take(figure.spec().rates).find(|id| id.metric.kind == Kind::Quantity);
     match quantity {
         Some(id) => Err(FigureError::NotARate { figure, metric: id.name.to_owned() }),
         None => Ok(found),
@@ -171,7 +167,9 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
             let known: Vec<_> = listed.iter().filter_map(|name| named(name)).collect();
             Some(if known.is_empty() { all } else { known })
         }
-        FigureName::Spider => (all.len() >= figure.metrics().0[0]).then(|| all.into_iter().take(MOST_AXES).collect()),
+        FigureName::Spider => {
+            (all.len() >= figure.spec().metrics[0]).then(|| all.into_iter().take(MOST_AXES).collect())
+        }
         FigureName::Scatter => {
             let measuring = |what| all.iter().filter(move |id| id.metric.measures() == Some(what)).copied();
             let found: Vec<_> =

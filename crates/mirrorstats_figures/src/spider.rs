@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use crate::kit::marker::polar;
 use crate::kit::{
-    Arrangement, MARGIN, Mark, Member, PALETTE, Panels, Point, Sheet, Stroke, Swatch, TextAnchor, legend, lettering,
-    many, marker, panels, polar,
+    Grid, MARGIN, Mark, Member, PALETTE, Point, Sheet, Stroke, Swatch, TextAnchor, legend, lettering, many, marker,
 };
 use crate::matrix::MetricId;
 use crate::missing::{self, Strip};
@@ -19,14 +19,12 @@ const RADIUS: f64 = 70.0;
 const LABEL_ROOM: f64 = 18.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    let Scene { matrix, roster, metrics: axes, width: all } = scene;
-    let (columns, width) = panels::most(MOST_COLUMNS, all - 2.0 * MARGIN, [LEAST_PANEL, GAP]);
-    let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, axes, width)).collect();
-    let below = strips.iter().map(|strip| strip.height).fold(0.0, f64::max);
+    let Scene { matrix, roster, metrics: axes, width } = scene;
+    let grid = Grid { width, left: MARGIN, gap: GAP, columns: MOST_COLUMNS }.at_least(LEAST_PANEL);
+    let (strips, below) = Strip::of_experiments(scene, axes, grid.panel());
+    let titles = matrix.titles(&matrix.experiments);
     let height = 2.0 * (RADIUS + LABEL_ROOM) + below;
-    let arranged = Arrangement { left: MARGIN, columns, height, gap: GAP };
-    let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), all, arranged);
-    let mut sheet = panels.sheet(all);
+    let (mut sheet, panels) = grid.panels(&matrix.experiments, &titles, height);
     for ((experiment, body), strip) in matrix.experiments.iter().zip(&panels.bodies).zip(&strips) {
         Radar { scene, experiment, center: (body.center().0, body.top + RADIUS + LABEL_ROOM) }.draw(&mut sheet);
         strip.draw(&mut sheet, (body.left, body.bottom() - below));
@@ -83,13 +81,12 @@ impl Radar<'_> {
     }
 
     fn web(&self, sheet: &mut Sheet) {
-        let surface = &PALETTE.surface;
+        let (axes, surface) = (self.scene.metrics.len(), &PALETTE.surface);
         for (share, color) in [(0.25, surface.rule), (0.5, surface.rule), (0.75, surface.rule), (1.0, surface.axis)] {
-            let mut ring: Vec<Point> = (0..self.scene.metrics.len()).map(|axis| self.place(axis, share)).collect();
-            ring.push(ring[0]);
+            let ring: Vec<Point> = (0..=axes).map(|axis| self.place(axis % axes, share)).collect();
             sheet.line(&ring, Stroke::solid(color, 0.7));
         }
-        for axis in 0..self.scene.metrics.len() {
+        for axis in 0..axes {
             sheet.line(&[self.center, self.place(axis, 1.0)], Stroke::solid(surface.rule, 0.7));
         }
     }
@@ -108,11 +105,8 @@ impl Radar<'_> {
     }
 
     fn shares(&self, member: Member<'_>) -> Vec<Option<f64>> {
-        self.scene
-            .metrics
-            .iter()
-            .map(|&metric| self.scene.matrix.goodness(self.experiment, member.model, metric))
-            .collect()
+        let share = |metric: &MetricId<'_>| self.scene.matrix.goodness(self.experiment, member.model, *metric);
+        self.scene.metrics.iter().map(share).collect()
     }
 
     fn line(&self, sheet: &mut Sheet, member: Member<'_>) {
@@ -135,8 +129,7 @@ impl Radar<'_> {
         for (axis, (metric, share)) in self.scene.metrics.iter().zip(self.shares(member)).enumerate() {
             let Some(share) = share else { continue };
             let reading = self.scene.matrix.reading(self.experiment, member.model, *metric);
-            let mark = reading.mark(self.experiment, member.model, metric.name);
-            sheet.mark(&mark, |sheet| marker::draw(sheet, self.place(axis, share), 2.6, member.style));
+            sheet.mark(&reading.mark(), |sheet| marker::draw(sheet, self.place(axis, share), 2.6, member.style));
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::kit::FULL_WIDTH;
+use super::kit::lettering::FULL_WIDTH;
 
 /// The smallest scale of text: from 9 px, the smallest lettering, to 6 pt.
 const LEAST_SCALE: f64 = 8.0 / 9.0;

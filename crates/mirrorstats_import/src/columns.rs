@@ -3,15 +3,18 @@
 //!
 //! Rule: a value is taken unchanged or refused: texts never become numbers, and numbers stay equal.
 
+use arrow::array::{Array as _, ArrayRef, RecordBatch};
 use indexmap::IndexMap;
 
+use super::arrays::{array, table};
 use super::error::{Fault, Location};
-use super::value::{LineValue, Members, whole};
-use super::{Limits, cell};
+use super::mapping::Order;
+use super::value::Cell;
+use super::{Limits, spelling};
 use mirrorstats_exact::suggest::nearest;
-use mirrorstats_trace::episodes::identification::normal_form;
+use mirrorstats_trace::episodes::identification::Reading;
 use mirrorstats_trace::schema::rules::{Known, Requirement, Rule, rules_of};
-use mirrorstats_trace::schema::{COLUMNS, Column, Kind, Stored};
+use mirrorstats_trace::schema::{COLUMNS, Column, DeclaredColumn, Kind, Stored};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Own {
@@ -51,82 +54,71 @@ pub(super) const TEXT: &str = "identification";
 const SEE: &str = "`mirrorstats trace schema step` prints what a step may hold";
 
 impl Columns {
-    /// The values with the types that the schema or the definitions give their columns: cells of CSV, and whole numbers
-    /// with a point, which data frames write beside missing values.
-    ///
-    /// Columns in the names of folders are added; a different value in the row is a fault.
-    pub(super) fn typed(members: Members, folders: &Members, limits: Limits<'_>) -> (Members, Option<Fault>) {
-        let mut members = Self::with_types(members, limits);
-        if Self::lacks_attribution(&members, limits) {
-            let text = members.iter().find(|(key, _)| key == TEXT).and_then(|(_, value)| attribution(value));
-            members.push((ATTRIBUTION.to_owned(), text.map_or(LineValue::Null, LineValue::Text)));
+    /// The rows with the columns in the names of folders, and with attributions that are read from texts; a different
+    /// value in a row is a fault.
+    pub(super) fn completed(
+        &mut self,
+        rows: &RecordBatch,
+        folders: &[(String, Option<String>)],
+        limits: Limits<'_>,
+    ) -> (RecordBatch, Vec<(usize, Fault)>) {
+        let (mut faults, mut added) = (Vec::new(), Vec::new());
+        let has = |name: &str| rows.column_by_name(name).is_some();
+        if let Some(texts) = rows.column_by_name(TEXT)
+            && limits.expected.domain.column(ATTRIBUTION).is_some()
+            && !has(ATTRIBUTION)
+        {
+            self.is_derived = true;
+            let colors = array((0..texts.len()).map(|row| attribution(Cell::at(texts, row))));
+            added.push((ATTRIBUTION.to_owned(), colors));
         }
-        let mut fault = None;
-        for (key, value) in Self::with_types(folders.clone(), limits) {
-            match members.iter().find(|(name, _)| *name == key) {
-                None => members.push((key, value)),
-                Some((_, found)) if is_same(found, &value) => {}
-                Some((_, found)) => {
-                    let expected = format!("{}, as in the name of the folder `{key}=...`", value.shown());
-                    let help = "move the file to the folder of its values, or correct the column";
-                    fault = Some(Fault::new(expected, found.shown(), help).of_key(&key));
-                }
-            }
-        }
-        (members, fault)
-    }
-
-    /// Returns true if the attribution is read from the text of the reply, since the step has no other.
-    pub(super) fn lacks_attribution(members: &Members, limits: Limits<'_>) -> bool {
-        let has = |name: &str| members.iter().any(|(key, _)| key == name);
-        limits.expected.domain.column(ATTRIBUTION).is_some() && has(TEXT) && !has(ATTRIBUTION)
-    }
-
-    fn with_types(mut members: Members, limits: Limits<'_>) -> Members {
-        let Limits { expected, .. } = limits;
-        let declared = |key: &str| expected.declared.iter().find(|declared| declared.name == key);
-        for (key, value) in &mut members {
-            let known = expected.domain.column(key).map(|column| column.stored.kind());
-            let Some(kind) = known.or_else(|| Some(declared(key)?.kind)) else { continue };
-            match value {
-                LineValue::Cell(text) => *value = cell::typed(text, kind),
-                LineValue::Unheld(text) if kind == Kind::Float => *value = cell::typed(text, kind),
-                LineValue::Float(number) if kind == Kind::Int => {
-                    *value = whole(*number).map_or(LineValue::Float(*number), LineValue::Int);
-                }
-                _ => {}
-            }
-        }
-        members
-    }
-
-    pub(super) fn with_cells(&self, mut members: Members) -> Members {
-        for (key, value) in &mut members {
-            if let (LineValue::Cell(text), Some(kind)) = (&*value, self.own.get(key).and_then(Inferred::kind)) {
-                *value = cell::typed(text, kind);
-            }
-        }
-        members
-    }
-
-    pub(super) fn check(&mut self, members: &Members, place: &Location, limits: Limits<'_>) -> Vec<Fault> {
-        let mut faults = Vec::new();
-        for (key, value) in members {
-            let fault = match limits.expected.domain.column(key) {
-                Some(column) => {
-                    if !self.known.contains(&column.name) {
-                        self.known.push(column.name);
-                    }
-                    misfit(column, value, limits)
-                }
-                None => misdeclared(key, value, limits).or_else(|| self.check_own(key, value, place)),
+        for (name, value) in folders {
+            let value = value.as_ref().map_or(Cell::Null, |value| Cell::Spelled(value.into()));
+            let Some(values) = rows.column_by_name(name) else {
+                added.push((name.clone(), array(vec![value; rows.num_rows()])));
+                continue;
             };
-            faults.extend(fault.map(|fault| fault.of_key(key).at(place)));
+            let kind = limits.kind(name);
+            let value = value.typed(kind);
+            for row in 0..values.len() {
+                let found = Cell::at(values, row).typed(kind);
+                if !is_same(&found, &value) {
+                    let expected = format!("{}, as in the name of the folder `{name}=...`", value.shown());
+                    let help = "move the file to the folder of its values, or correct the column";
+                    faults.push((row, Fault::new(expected, found.shown(), help).of_key(name)));
+                }
+            }
         }
-        let has = |name: &str| members.iter().any(|(key, _)| key == name);
+        let own =
+            rows.schema_ref().fields().iter().map(|field| field.name().clone()).zip(rows.columns().iter().cloned());
+        (table(own.chain(added).collect(), rows.num_rows()), faults)
+    }
+
+    /// The faults of these rows, each with its row.
+    pub(super) fn check(
+        &mut self,
+        rows: &RecordBatch,
+        place: &dyn Fn(usize) -> Location,
+        order: Order,
+        limits: Limits<'_>,
+    ) -> Vec<(usize, Fault)> {
+        let mut faults = Vec::new();
+        for (field, values) in rows.schema_ref().fields().iter().zip(rows.columns()) {
+            let (key, known) = (field.name(), limits.expected.domain.column(field.name()));
+            if let Some(column) = known.filter(|column| !self.known.contains(&column.name)) {
+                self.known.push(column.name);
+            }
+            let found = match known {
+                Some(column) => misfits(column, values, order, limits),
+                None => self.check_own(key, values, place, limits),
+            };
+            faults.extend(found.into_iter().map(|(row, fault)| (row, fault.of_key(key))));
+        }
         let domain = limits.expected.domain;
-        for column in COLUMNS.iter().filter(|column| column.required && domain.has(column) && !has(column.name)) {
-            faults.push(missing(column, members, limits).at(place));
+        let has = |column: &Column| rows.column_by_name(column.name).is_some();
+        for column in COLUMNS.iter().filter(|column| column.required && domain.has(column) && !has(column)) {
+            let fault = missing(column, rows, limits);
+            faults.extend((0..rows.num_rows()).map(|row| (row, fault.clone())));
         }
         faults
     }
@@ -135,8 +127,8 @@ impl Columns {
         let odd = |(name, inferred): (&String, &Inferred)| {
             let (place, cell) = inferred.odd.as_ref()?;
             let kind = inferred.kind.filter(|kind| *kind != Kind::String)?;
-            let help = if cell::is_absent(cell) { ABSENT } else { UNHELD };
-            let found = LineValue::Cell(cell.clone()).shown();
+            let help = if spelling::is_absent(cell) { ABSENT } else { UNHELD };
+            let found = Cell::Spelled(cell.into()).shown();
             Some(Fault::new(format!("{}, as in other rows", named(kind)), found, help).of_key(name).at(place))
         };
         let lossy = |(name, inferred): (&String, &Inferred)| {
@@ -156,20 +148,38 @@ impl Columns {
         self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind() }).collect()
     }
 
-    fn check_own(&mut self, key: &str, value: &LineValue, place: &Location) -> Option<Fault> {
-        if key.is_empty() {
-            return Some(Fault::new("a key with a name", "an empty one", "give the key a name, or leave it out"));
-        }
-        let kind = match kind_of(value) {
-            Ok(kind) => kind,
-            Err(fault) => return Some(*fault),
-        };
-        if !self.own.contains_key(key) && self.own.len() == MOST_OWN {
-            let found = "one more";
+    fn check_own(
+        &mut self,
+        key: &str,
+        values: &ArrayRef,
+        place: &dyn Fn(usize) -> Location,
+        limits: Limits<'_>,
+    ) -> Vec<(usize, Fault)> {
+        let refused = if key.is_empty() {
+            Some(Fault::new("a key with a name", "an empty one", "give the key a name, or leave it out"))
+        } else if !self.own.contains_key(key) && self.own.len() == MOST_OWN {
             let help = "keys are the same in all lines; write what changes from line to line as a value";
-            return Some(Fault::new(format!("at most {MOST_OWN} keys that the schema does not know"), found, help));
+            Some(Fault::new(format!("at most {MOST_OWN} keys that the schema does not know"), "one more", help))
+        } else {
+            None
+        };
+        if let Some(fault) = refused {
+            // Rows without the key have a null too.
+            let given = (0..values.len()).filter(|row| Cell::at(values, *row) != Cell::Null);
+            return given.map(|row| (row, fault.clone())).collect();
         }
-        self.own.entry(key.to_owned()).or_default().take(kind, value, place)
+        let declared = limits.declared(key);
+        let inferred = self.own.entry(key.to_owned()).or_default();
+        if declared.is_none() && inferred.is_of(values) {
+            return Vec::new();
+        }
+        let mut faults = Vec::new();
+        for row in 0..values.len() {
+            let value = Cell::at(values, row).typed(declared.map(|declared| declared.kind));
+            let fault = declared.and_then(|declared| misdeclared(declared, &value));
+            faults.extend(fault.or_else(|| inferred.take(&value, &|| place(row))).map(|fault| (row, fault)));
+        }
+        faults
     }
 }
 
@@ -178,29 +188,38 @@ impl Inferred {
         self.kind.or(self.odd.as_ref().map(|_| Kind::String))
     }
 
-    fn take(&mut self, kind: Option<Kind>, value: &LineValue, place: &Location) -> Option<Fault> {
-        let now = kind?;
-        if let LineValue::Cell(cell) = value
-            && cell::is_odd(cell)
+    /// Returns true if the values are of the type so far, and all of them are held by it.
+    fn is_of(&self, values: &ArrayRef) -> bool {
+        let is_simple = matches!(self.kind, Some(Kind::Bool | Kind::Float | Kind::String));
+        is_simple && self.is_typed && self.kind.map(Kind::data_type).as_ref() == Some(values.data_type())
+    }
+
+    fn take(&mut self, value: &Cell<'_>, place: &dyn Fn() -> Location) -> Option<Fault> {
+        let now = match kind_of(value) {
+            Ok(now) => now?,
+            Err(fault) => return Some(*fault),
+        };
+        if let Cell::Spelled(cell) = value
+            && spelling::is_odd(cell)
         {
-            self.odd.get_or_insert_with(|| (place.clone(), cell.clone()));
+            self.odd.get_or_insert_with(|| (place(), cell.to_string()));
             return None;
         }
-        let is_cell = matches!(value, LineValue::Cell(_));
+        let is_cell = matches!(value, Cell::Spelled(_));
         if let Some(value) = integer(value).filter(|value| value.unsigned_abs() > EXACT && self.wide.is_none()) {
-            self.wide = Some((place.clone(), value));
+            self.wide = Some((place(), value));
         }
         let are_cells = !self.is_typed && is_cell;
         self.is_typed |= !is_cell;
         let Some((before, first)) = self.kind.zip(self.first.as_ref()) else {
-            (self.kind, self.first) = (Some(now), Some(place.clone()));
+            (self.kind, self.first) = (Some(now), Some(place()));
             return None;
         };
         match (before, now) {
             (before, now) if before == now => None,
             (Kind::String, _) if is_cell => None,
             (before, now) if are_cells => {
-                self.kind = Some(cell::joined(before, now));
+                self.kind = Some(spelling::joined(before, now));
                 None
             }
             (Kind::Int, Kind::Float) | (Kind::Float, Kind::Int) => {
@@ -215,21 +234,21 @@ impl Inferred {
     }
 }
 
-fn attribution(text: &LineValue) -> Option<String> {
-    let LineValue::Text(text) = text else { return None };
-    normal_form(text).map(str::to_owned)
+fn attribution(text: Cell<'_>) -> Cell<'static> {
+    let Cell::Text(text) = text.typed(Kind::String) else { return Cell::Null };
+    Reading::of(&text).self_color().map_or(Cell::Null, |color| Cell::Text(color.to_owned().into()))
 }
 
 /// Returns true if a value equals that of a folder's name, whose type may be unknown.
-fn is_same(value: &LineValue, folder: &LineValue) -> bool {
-    let cell = |text: &String| kind_of(value).ok().flatten().map(|kind| cell::typed(text, kind));
-    value == folder || matches!(folder, LineValue::Cell(text) if cell(text).as_ref() == Some(value))
+fn is_same(value: &Cell<'_>, folder: &Cell<'_>) -> bool {
+    let kind = kind_of(value).ok().flatten();
+    value == folder || kind.is_some_and(|kind| folder.clone().typed(kind) == value.clone().typed(kind))
 }
 
-fn integer(value: &LineValue) -> Option<i64> {
+fn integer(value: &Cell<'_>) -> Option<i64> {
     match value {
-        LineValue::Int(value) => Some(*value),
-        LineValue::Cell(text) => text.parse().ok(),
+        Cell::Int(value) => Some(*value),
+        Cell::Spelled(text) => text.parse().ok(),
         _ => None,
     }
 }
@@ -242,47 +261,51 @@ fn named(kind: Kind) -> &'static str {
     }
 }
 
-fn kind_of(value: &LineValue) -> Result<Option<Kind>, Box<Fault>> {
+fn kind_of(value: &Cell<'_>) -> Result<Option<Kind>, Box<Fault>> {
     match value {
-        LineValue::Null => Ok(None),
-        LineValue::Bool(_) => Ok(Some(Kind::Bool)),
-        LineValue::Int(_) => Ok(Some(Kind::Int)),
-        LineValue::Float(_) => Ok(Some(Kind::Float)),
-        LineValue::Text(_) => Ok(Some(Kind::String)),
-        LineValue::Cell(text) => Ok(Some(cell::kind_of(text))),
-        LineValue::Unheld(_) => {
-            let expected = format!("an integer of at most {}, or a number that 64-bit floats hold", i64::MAX);
-            Err(Box::new(Fault::new(expected, value.shown(), UNHELD)))
-        }
-        LineValue::List | LineValue::Object(_) => {
+        Cell::Null => Ok(None),
+        Cell::Bool(_) => Ok(Some(Kind::Bool)),
+        Cell::Int(_) => Ok(Some(Kind::Int)),
+        Cell::Float(_) => Ok(Some(Kind::Float)),
+        Cell::Text(_) => Ok(Some(Kind::String)),
+        Cell::Spelled(text) => Ok(Some(spelling::kind_of(text))),
+        Cell::Unheld(_) => Err(Box::new(Fault::new(spelling::held(), value.shown(), UNHELD))),
+        Cell::List | Cell::Object => {
             let help = "give its parts keys of their own, write it as text, or leave it out";
             Err(Box::new(Fault::new("null, true or false, a number or a text", value.shown(), help)))
         }
     }
 }
 
-fn misfit(column: &Column, value: &LineValue, limits: Limits<'_>) -> Option<Fault> {
+fn misfits(column: &Column, values: &ArrayRef, order: Order, limits: Limits<'_>) -> Vec<(usize, Fault)> {
+    let Limits { expected, palette, .. } = limits;
+    let rules = rules_of(column, Known { palette, experiments: expected.experiments });
+    let is_ordered = column.name == "t" && order != Order::Numbers;
+    let fault = |row| {
+        let value = Cell::at(values, row).typed(column.stored.kind());
+        if is_ordered && value.int().is_some() { None } else { misfit(column, &value, &rules) }
+    };
+    (0..values.len()).filter_map(|row| Some((row, fault(row)?))).collect()
+}
+
+fn misfit(column: &Column, value: &Cell<'_>, rules: &[Rule<'_>]) -> Option<Fault> {
     let refused = |help: &str| Some(Fault::new(expected(column), value.shown(), help));
     match (column.stored.kind(), value) {
-        (_, LineValue::Null) if column.nullable => None,
-        (_, LineValue::Null) => refused("give the step its value; nothing is filled in"),
-        (Kind::Bool, LineValue::Bool(_)) => None,
-        (Kind::Int, LineValue::Int(value)) if *value < lowest(column) => {
+        (_, Cell::Null) if column.nullable => None,
+        (_, Cell::Null) => refused("give the step its value; nothing is filled in"),
+        (Kind::Bool, Cell::Bool(_)) => None,
+        (Kind::Int, Cell::Int(value)) if *value < lowest(column) => {
             refused(if column.name == "t" { "number the steps from 1" } else { "correct the number" })
         }
-        (Kind::Int, LineValue::Int(value)) if column.stored.range().is_none_or(|(_, highest)| *value <= highest) => {
-            None
-        }
-        (Kind::Int, LineValue::Float(value)) if value.fract() != 0.0 => refused("write a whole number"),
-        (Kind::Int, LineValue::Int(_) | LineValue::Unheld(_) | LineValue::Float(_)) => {
+        (Kind::Int, Cell::Int(value)) if column.stored.range().is_none_or(|(_, highest)| *value <= highest) => None,
+        (Kind::Int, Cell::Float(value)) if value.fract() != 0.0 => refused("write a whole number"),
+        (Kind::Int, Cell::Int(_) | Cell::Unheld(_) | Cell::Float(_)) => {
             refused("correct the number, or use smaller ones")
         }
         (Kind::Float, _) if is_held(column, value) => None,
-        (Kind::Float, LineValue::Unheld(_)) => refused("64-bit floats do not hold it: write fewer digits"),
-        (Kind::Float, LineValue::Int(_) | LineValue::Float(_)) => refused("correct the number"),
-        (Kind::String, LineValue::Text(text)) => {
-            let Limits { expected, palette, .. } = limits;
-            let rules = rules_of(column, Known { palette, experiments: expected.experiments });
+        (Kind::Float, Cell::Unheld(_)) => refused("64-bit floats do not hold it: write fewer digits"),
+        (Kind::Float, Cell::Int(_) | Cell::Float(_)) => refused("correct the number"),
+        (Kind::String, Cell::Text(text)) => {
             rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
         }
         _ if is_absent(value) => refused(ABSENT),
@@ -290,19 +313,17 @@ fn misfit(column: &Column, value: &LineValue, limits: Limits<'_>) -> Option<Faul
     }
 }
 
-fn misdeclared(key: &str, value: &LineValue, limits: Limits<'_>) -> Option<Fault> {
-    let declared = limits.expected.declared.iter().find(|declared| declared.name == key)?;
+fn misdeclared(declared: &DeclaredColumn, value: &Cell<'_>) -> Option<Fault> {
     let is_of_kind = matches!(
         (declared.kind, value),
-        (_, LineValue::Null)
-            | (Kind::Bool, LineValue::Bool(_))
-            | (Kind::Int, LineValue::Int(_))
-            | (Kind::Float, LineValue::Int(_) | LineValue::Float(_))
-            | (Kind::String, LineValue::Text(_))
+        (_, Cell::Null)
+            | (Kind::Bool, Cell::Bool(_))
+            | (Kind::Int, Cell::Int(_))
+            | (Kind::Float, Cell::Int(_) | Cell::Float(_))
+            | (Kind::String, Cell::Text(_))
     );
     let help = "correct the value, or declare the column as the lines have it, under `[column.NAME]`";
-    let is_held =
-        !matches!(value, LineValue::Unheld(_)) && !matches!(value, LineValue::Int(number) if !is_exact(*number));
+    let is_held = !matches!(value, Cell::Unheld(_)) && !matches!(value, Cell::Int(number) if !is_exact(*number));
     if declared.kind == Kind::Float && !is_held {
         let expected = format!("a number that 64-bit floats hold exactly, as the integers up to {EXACT}");
         return Some(Fault::new(expected, value.shown(), help));
@@ -313,16 +334,16 @@ fn misdeclared(key: &str, value: &LineValue, limits: Limits<'_>) -> Option<Fault
         let expected = format!("{what}, as the definitions declare it{or_null}");
         return Some(Fault::new(expected, value.shown(), help));
     }
-    let LineValue::Text(text) = value else { return None };
-    let is_known = declared.values.is_empty() || declared.values.contains(text);
+    let Cell::Text(text) = value else { return None };
+    let is_known = declared.values.is_empty() || declared.values.iter().any(|value| value == text);
     let near =
         || nearest(text, declared.values.iter().map(String::as_str)).map(|like| format!("did you mean `{like}`?"));
     let expected = || format!("one of {}, or null", declared.values.join(", "));
     (!is_known).then(|| Fault::new(expected(), value.shown(), near().unwrap_or_else(|| help.to_owned())))
 }
 
-fn is_absent(value: &LineValue) -> bool {
-    matches!(value, LineValue::Text(text) if cell::is_absent(text))
+fn is_absent(value: &Cell<'_>) -> bool {
+    matches!(value, Cell::Text(text) if spelling::is_absent(text))
 }
 
 #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "that is the question")]
@@ -341,10 +362,10 @@ pub(super) fn lowest(column: &Column) -> i64 {
 
 #[expect(clippy::cast_precision_loss, reason = "it is exact")]
 #[expect(clippy::cast_possible_truncation, reason = "that is the question")]
-fn is_held(column: &Column, value: &LineValue) -> bool {
+fn is_held(column: &Column, value: &Cell<'_>) -> bool {
     let number = match value {
-        LineValue::Int(value) if is_exact(*value) => *value as f64,
-        LineValue::Float(value) => *value,
+        Cell::Int(value) if is_exact(*value) => *value as f64,
+        Cell::Float(value) => *value,
         _ => return false,
     };
     let fits = column.stored != Stored::Float32 || (number as f32).is_finite();
@@ -384,9 +405,9 @@ fn odd_text(column: &Column, rule: &Rule<'_>, text: &str, found: String) -> Faul
     }
 }
 
-fn missing(column: &Column, members: &Members, limits: Limits<'_>) -> Fault {
+fn missing(column: &Column, rows: &RecordBatch, limits: Limits<'_>) -> Fault {
     let is_own = |key: &&str| limits.expected.domain.column(key).is_none();
-    let strangers = members.iter().map(|(key, _)| key.as_str()).filter(is_own);
+    let strangers = rows.schema_ref().fields().iter().map(|field| field.name().as_str()).filter(is_own);
     let found =
         nearest(column.name, strangers).map_or("none".to_owned(), |key| format!("none, though there is `{key}`"));
     let help = match column.name {

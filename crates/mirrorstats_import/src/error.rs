@@ -37,6 +37,15 @@ impl Faults {
         faults.into_iter().for_each(|fault| self.add(fault));
     }
 
+    pub(super) const fn is_empty(&self) -> bool {
+        self.faults.is_empty()
+    }
+
+    pub(super) fn join(&mut self, other: Self) {
+        self.extend(other.faults);
+        self.more += other.more;
+    }
+
     pub(super) fn check(&mut self) -> Result<(), ImportError> {
         let Self { faults, more } = std::mem::take(self);
         if faults.is_empty() { Ok(()) } else { Err(ImportError::Faults { faults, more }) }
@@ -49,17 +58,11 @@ pub enum ImportError {
     Faults { faults: Vec<Fault>, more: usize },
     #[error("cannot read {file}; check the path and its permissions")]
     Read { file: String, source: io::Error },
-    #[error("{file}: expected the lines of the first pass, found others\n  help: import it when nothing writes to it")]
-    Changed { file: String },
     #[error(transparent)]
     Trace(#[from] TraceError),
 }
 
 impl ImportError {
-    pub(super) fn changed(file: &str) -> Self {
-        Self::Changed { file: file.to_owned() }
-    }
-
     pub(super) fn read(file: &str) -> impl FnOnce(io::Error) -> Self + use<> {
         let file = file.to_owned();
         move |source| Self::Read { file, source }

@@ -2,96 +2,125 @@
 
 use std::collections::HashMap;
 
-use super::error::{Fault, Location};
-use super::line::Line;
-use super::text::Text;
-use super::value::{LineValue, Members};
-use mirrorstats_exact::escape::visible;
-use mirrorstats_trace::schema::{COLUMNS, DeclaredColumn};
+use arrow::array::{ArrayRef, RecordBatch};
 
-#[derive(Clone, Copy, Debug)]
+use super::error::{Fault, Faults, Location};
+use super::mapping::Order;
+use super::text::Text;
+use super::value::Cell;
+use mirrorstats_exact::escape::visible;
+use mirrorstats_trace::schema::{COLUMNS, DeclaredColumn, Kind};
+
+/// A step by its place: the batch of a text, and the row in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct IndexedStep {
-    pub(super) episode: usize,
+    pub(super) episode: u32,
     t: i64,
-    pub(super) text: usize,
-    pub(super) offset: u64,
-    line: u64,
+    pub(super) text: u32,
+    pub(super) batch: u32,
+    pub(super) row: u32,
 }
 
 #[derive(Debug)]
 struct Head {
     id: String,
     place: Location,
-    constants: Vec<LineValue>,
+    constants: Vec<Cell<'static>>,
 }
 
 #[derive(Debug)]
 pub(super) struct Index {
-    constants: Vec<String>,
+    constants: Vec<(String, Kind)>,
     heads: Vec<Head>,
-    by_id: HashMap<String, usize>,
+    by_id: HashMap<String, u32>,
     steps: Vec<IndexedStep>,
-}
-
-fn value<'a>(members: &'a Members, name: &str) -> &'a LineValue {
-    members.iter().find(|(key, _)| key == name).map_or(&LineValue::Null, |(_, value)| value)
 }
 
 impl Index {
     pub(super) fn new(declared: &[DeclaredColumn]) -> Self {
         let known = COLUMNS.iter().filter(|column| column.constant && column.name != "episode_id");
-        let declared = declared.iter().filter(|column| column.constant).map(|column| column.name.as_str());
-        let constants = known.map(|column| column.name).chain(declared).map(str::to_owned).collect();
-        Self { constants, heads: Vec::new(), by_id: HashMap::new(), steps: Vec::new() }
+        let known = known.map(|column| (column.name.to_owned(), column.stored.kind()));
+        let declared = declared.iter().filter(|column| column.constant);
+        let declared = declared.map(|column| (column.name.clone(), column.kind));
+        Self { constants: known.chain(declared).collect(), heads: Vec::new(), by_id: HashMap::new(), steps: Vec::new() }
     }
 
-    pub(super) fn add(&mut self, text: usize, line: &Line, members: &Members) -> Option<Fault> {
-        let (LineValue::Text(id), LineValue::Int(t)) = (value(members, "episode_id"), value(members, "t")) else {
-            return None;
+    /// Adds the rows of a batch without those that have a fault; returns the rows whose constants change.
+    pub(super) fn add(
+        &mut self,
+        (text, batch): (usize, usize),
+        rows: &RecordBatch,
+        place: impl Fn(usize) -> Location,
+        is_faulty: impl Fn(usize) -> bool,
+    ) -> Vec<(usize, Fault)> {
+        let (Some(ids), Some(ts)) = (rows.column_by_name("episode_id"), rows.column_by_name("t")) else {
+            return Vec::new();
         };
-        let known = self.by_id.get(id).copied();
-        let episode = known.unwrap_or_else(|| self.begin(id, line, members));
-        self.steps.push(IndexedStep { episode, t: *t, text, offset: line.offset, line: line.place.line });
-        let head = &self.heads[episode];
-        let mut pairs = self.constants.iter().zip(&head.constants);
-        pairs.find_map(|(column, first)| {
-            let now = value(members, column);
-            if now.is_same(first) {
-                return None;
-            }
-            let expected = format!("{}, as in the episode's first line ({})", first.shown(), head.place);
-            let help = "correct the lines, or give the episodes ids of their own";
-            Some(Fault::new(expected, now.shown(), help).of_key(column).at(&line.place))
-        })
+        let constants: Vec<_> = self.constants.iter().map(|(name, kind)| (rows.column_by_name(name), *kind)).collect();
+        let mut faults = Vec::new();
+        for row in (0..rows.num_rows()).filter(|row| !is_faulty(*row)) {
+            let (Cell::Text(id), Cell::Int(t)) =
+                (Cell::at(ids, row).typed(Kind::String), Cell::at(ts, row).typed(Kind::Int))
+            else {
+                continue;
+            };
+            let known = self.by_id.get(&*id).copied();
+            let episode = known.unwrap_or_else(|| {
+                let constants = constants.iter().map(|column| constant(*column, row).into_owned()).collect();
+                self.heads.push(Head { id: id.to_string(), place: place(row), constants });
+                let episode = narrow(self.heads.len() - 1);
+                self.by_id.insert(id.to_string(), episode);
+                episode
+            });
+            let [text, batch, at] = [text, batch, row].map(narrow);
+            self.steps.push(IndexedStep { episode, t, text, batch, row: at });
+            let head = &self.heads[episode as usize];
+            let changed =
+                self.constants.iter().zip(&constants).zip(&head.constants).find_map(|((name, column), first)| {
+                    let now = constant(*column, row);
+                    let expected = || format!("{}, as in the episode's first line ({})", first.shown(), head.place);
+                    let help = "correct the lines, or give the episodes ids of their own";
+                    (!now.is_same(first)).then(|| Fault::new(expected(), now.shown(), help).of_key(&name.0))
+                });
+            faults.extend(changed.map(|fault| (row, fault)));
+        }
+        faults
     }
 
-    fn begin(&mut self, id: &str, line: &Line, members: &Members) -> usize {
-        let constants = self.constants.iter().map(|column| value(members, column).clone()).collect();
-        self.heads.push(Head { id: id.to_owned(), place: line.place.clone(), constants });
-        self.by_id.insert(id.to_owned(), self.heads.len() - 1);
-        self.heads.len() - 1
-    }
-
-    /// The steps of each episode in turn, ordered by t; adds a fault for each incomplete episode.
-    pub(super) fn into_steps(self, texts: &[Text], faults: &mut super::error::Faults) -> Vec<IndexedStep> {
+    /// The steps of each episode in turn, in their order; adds a fault for each incomplete episode.
+    pub(super) fn into_steps(self, texts: &[Text], faults: &mut Faults) -> Vec<IndexedStep> {
         let Self { heads, mut steps, .. } = self;
-        steps.sort_by_key(|step| (step.episode, step.t));
+        steps.sort_unstable();
         for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
-            let id = &heads[episode[0].episode].id;
-            faults.extend(sequence_fault(id, episode, texts));
+            faults.extend(sequence_fault(&heads[episode[0].episode as usize].id, episode, texts));
         }
         steps
     }
 }
 
+fn narrow(number: usize) -> u32 {
+    u32::try_from(number).expect("an index of less than 4 billion entries fits into memory")
+}
+
+fn constant((column, kind): (Option<&ArrayRef>, Kind), row: usize) -> Cell<'_> {
+    column.map_or(Cell::Null, |column| Cell::at(column, row).typed(kind))
+}
+
 fn sequence_fault(id: &str, episode: &[IndexedStep], texts: &[Text]) -> Option<Fault> {
-    let place = |step: &IndexedStep| texts[step.text].place(step.line);
+    let text = |step: &IndexedStep| &texts[step.text as usize];
+    let place = |step: &IndexedStep| text(step).place(step.batch as usize, step.row as usize);
     let of = format!("of episode `{}`", visible(id));
+    let order = text(episode.first()?).read.as_ref().map_or(Order::Numbers, |read| read.order);
     let mut before: Option<&IndexedStep> = None;
     for step in episode {
         let wanted = before.map_or(1, |before| before.t.saturating_add(1));
         let is_again = before.is_some_and(|before| before.t == step.t);
-        if step.t == wanted && !is_again {
+        let is_right = match order {
+            Order::Numbers => step.t == wanted && !is_again,
+            Order::Column => !is_again,
+            Order::Rows => true,
+        };
+        if is_right {
             before = Some(step);
             continue;
         }

@@ -1,56 +1,55 @@
 //! Makes a trace from steps and logs of harnesses that mirrorstats did not run.
 //!
 //! ```text
-//! lines, or rows of a format with their types ──► first pass: every line checked, where each step lies ──► second pass: rows, episode by episode ──► trace
+//! file ──► columns of its rows ──► mapping: steps ──► first pass: every value checked ──► second pass: cast, by episode ──► trace
 //! ```
 //!
-//! One line is one step, a flat object with the columns of the schema as keys (`schemas/step.schema.json`). Other keys
-//! become own columns. Lines of an episode may be scattered over places and files: `episode_id` and `t` identify the
-//! step. Episodes are ordered by their first lines.
+//! One row is one step with the columns of the schema (`schemas/step.schema.json`); others become own columns. Rows of
+//! an episode may be scattered over places and files: `episode_id` and `t` identify the step. Episodes are ordered by
+//! their first rows.
 //!
-//! Rule: all or nothing. A line that cannot be taken unchanged fails the import; values are never filled in or dropped.
-//! The one exception: steps with an `identification` and no key `self_color` get it from the text.
-//! Memory holds the position of each step, not the steps.
+//! Rule: all or nothing. Values stay in Arrow columns of the source's own types and are cast once; a value that cannot be
+//! taken unchanged fails the import, and values are never filled in or dropped. The one exception: steps with an
+//! `identification` and no key `self_color` get it from the text.
 
-mod cell;
+mod arrays;
 mod columns;
 mod error;
 mod format;
 mod index;
-mod line;
+mod json;
 mod mapping;
+mod rows;
 pub mod schema;
-mod table;
+mod spelling;
+mod spool;
 mod text;
 mod value;
+mod write;
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use arrow::datatypes::{DataType, Field};
-use parquet::errors::ParquetError;
 use serde_json::json;
 
 pub use columns::Own;
 pub use error::{Fault, ImportError};
 pub use format::Format;
-pub use mapping::{Mapping, MappingError};
+pub use mapping::{Mapping, MappingError, Notes};
 pub use text::Text;
 
 use columns::Columns;
 use error::Faults;
 use index::Index;
 use mirrorstats_exact::replace::NewFile;
-use mirrorstats_trace::episodes::identification::put_version;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::footers::declared::{Cluster, Origin};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::colors::palette::Palette;
-use mirrorstats_trace::schema::{Kind, Value};
+use mirrorstats_trace::schema::{DeclaredColumn, Kind};
 use mirrorstats_trace::validate::{Expected, validate_as};
-use mirrorstats_trace::write::row_groups::{Gathered, RowGroups, field};
-use value::{LineValue, Members};
+use write::write;
 
 /// Limits on the values of steps beyond the schema, and the trace's declarations about them.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,8 +67,19 @@ pub struct Limits<'a> {
 }
 
 impl Limits<'_> {
-    fn recording(&self, texts: &mut [Text]) -> Result<serde_json::Value, ImportError> {
-        let sources = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
+    fn declared(&self, name: &str) -> Option<&DeclaredColumn> {
+        self.expected.declared.iter().find(|declared| declared.name == name)
+    }
+
+    /// The type of a column that the schema or the definitions know.
+    fn kind(&self, name: &str) -> Option<Kind> {
+        let known = self.expected.domain.column(name).map(|column| column.stored.kind());
+        known.or_else(|| Some(self.declared(name)?.kind))
+    }
+
+    fn recording(&self, texts: &[Text]) -> serde_json::Value {
+        let steps = || texts.iter().filter_map(|text| text.read.as_ref());
+        let sources: Vec<&str> = steps().map(|steps| steps.sha256.as_str()).collect();
         let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
         let mut recording = json!({ "kind": origin.name(), "sources": sources });
         if let Some(domain) = self.domain {
@@ -84,12 +94,11 @@ impl Limits<'_> {
         if let Some(cluster) = self.cluster {
             recording["design"] = json!({ "cluster": cluster });
         }
-        if let Some(source) = texts.iter().find_map(|text| text.source.as_ref()) {
-            recording["mapping"] = source.mapping.clone();
-            let format = |text: &Text| text.source.as_ref().map_or(Format::JsonLines, |source| source.format).name();
-            recording["formats"] = texts.iter().map(format).collect();
+        if let Some(mapping) = steps().find_map(|steps| steps.mapping.as_ref()) {
+            recording["mapping"] = mapping.clone();
+            recording["formats"] = steps().map(|steps| steps.format.name()).collect();
         }
-        Ok(recording)
+        recording
     }
 }
 
@@ -115,7 +124,7 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     faults.check()?;
     let steps = index.into_steps(texts, &mut faults);
     faults.check()?;
-    let file = write(texts, &columns, &steps, out, limits)?;
+    let file = write(texts, &mut columns, &steps, out, limits)?;
     check(&file, out, limits.expected)?;
     file.commit().map_err(|error| TraceError::write(out, error))?;
     Ok(Imported {
@@ -134,27 +143,10 @@ fn survey(
     index: &mut Index,
     faults: &mut Faults,
 ) -> Result<(), ImportError> {
-    let mut is_empty = true;
-    text.rewind()?;
-    while let Some(line) = text.next_line()? {
-        is_empty = false;
-        let members = match text.members(&line.bytes, line.ended) {
-            Ok(members) => members,
-            Err(fault) => {
-                faults.add(fault.at(&line.place));
-                continue;
-            }
-        };
-        columns.is_derived |= Columns::lacks_attribution(&members, limits);
-        let (members, other) = Columns::typed(members, &text.folders, limits);
-        faults.extend(other.map(|fault| fault.at(&line.place)));
-        let found = columns.check(&members, &line.place, limits);
-        if found.is_empty() {
-            faults.extend(index.add(at, &line, &members));
-        }
-        faults.extend(found.into_iter().map(|fault| text.of_folder(fault)));
-    }
-    if is_empty {
+    let steps = text.steps()?;
+    let (order, batches) = (steps.order, steps.spool.batches.len());
+    let unread = std::mem::take(&mut steps.faults);
+    if batches == 0 && unread.is_empty() {
         faults.add(Fault {
             expected: "at least one step".into(),
             found: "none".into(),
@@ -162,68 +154,17 @@ fn survey(
             ..Fault::of_file(&text.name)
         });
     }
+    faults.join(unread);
+    for batch in 0..batches {
+        let place = |row| text.place(batch, row);
+        let (rows, mut found) = columns.completed(&text.batch(batch)?, &text.folders, limits);
+        found.extend(columns.check(&rows, &place, order, limits));
+        let refused: HashSet<usize> = found.iter().map(|(row, _)| *row).collect();
+        found.extend(index.add((at, batch), &rows, place, |row| refused.contains(&row)));
+        found.sort_by_key(|(row, _)| *row);
+        faults.extend(found.into_iter().map(|(row, fault)| text.of_folder(fault).at(&place(row))));
+    }
     Ok(())
-}
-
-/// The second pass: writes the rows of every episode to a temporary file beside `out`.
-fn write(
-    texts: &mut [Text],
-    columns: &Columns,
-    steps: &[index::IndexedStep],
-    out: &Path,
-    limits: Limits<'_>,
-) -> Result<NewFile, ImportError> {
-    let mut recording = limits.recording(texts)?;
-    if columns.is_derived {
-        put_version(&mut recording);
-    }
-    let file = NewFile::create(out).map_err(|error| TraceError::write(out, error))?;
-    let failed = |error: ParquetError| TraceError::write(out, error);
-    let known = columns.known().map(|column| (field(column), Some(column.stored.kind())));
-    let own = columns.own().into_iter().map(|own| {
-        // The declared type holds whole numbers of a float column, and columns of nulls. A column of nulls without it is
-        // compatible with any type in other files.
-        let declared = limits.expected.declared.iter().find(|declared| declared.name == own.name);
-        let kind = declared.map(|declared| declared.kind).or(own.kind);
-        (Field::new(&own.name, kind.map_or(DataType::Null, Kind::data_type), true), kind)
-    });
-    let mut rows = Gathered::new(known.chain(own));
-    let mut file = RowGroups::new(file, &rows.layout, Some(&recording)).map_err(failed)?;
-    for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
-        for step in episode {
-            let text = &mut texts[step.text];
-            let bytes = text.line_at(step.offset)?;
-            let members = text.members(&bytes, true).map_err(|_| ImportError::changed(&text.name))?;
-            let members = columns.with_cells(Columns::typed(members, &text.folders, limits).0);
-            add(&mut rows, &members).map_err(|()| ImportError::changed(&text.name))?;
-        }
-        file.end_episode(&mut rows).map_err(failed)?;
-    }
-    Ok(file.finish(Some(rows)).map_err(failed)?)
-}
-
-fn add(rows: &mut Gathered, members: &Members) -> Result<(), ()> {
-    // A row may have a thousand columns.
-    let members: HashMap<&str, &LineValue> = members.iter().map(|(key, value)| (key.as_str(), value)).collect();
-    for (field, values) in rows.layout.fields().iter().zip(&mut rows.columns) {
-        let value = members.get(field.name().as_str()).copied();
-        values.push(plain(value, field.data_type())?).ok_or(())?;
-    }
-    rows.rows += 1;
-    Ok(())
-}
-
-#[expect(clippy::cast_precision_loss, reason = "the first pass refused what would lose anything in an own column")]
-fn plain<'a>(value: Option<&'a LineValue>, stored: &DataType) -> Result<Option<Value<'a>>, ()> {
-    Ok(Some(match value {
-        None | Some(LineValue::Null) => return Ok(None),
-        Some(LineValue::Bool(value)) => Value::Bool(*value),
-        Some(LineValue::Int(value)) if stored.is_floating() => Value::Float(*value as f64),
-        Some(LineValue::Int(value)) => Value::Int(*value),
-        Some(LineValue::Float(value)) => Value::Float(*value),
-        Some(LineValue::Text(text)) => Value::Text(text),
-        Some(_) => return Err(()),
-    }))
 }
 
 fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {

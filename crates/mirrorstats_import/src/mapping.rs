@@ -1,76 +1,135 @@
-//! Maps lines of another shape to flat steps: columns by paths, constants, and nested values left out.
+//! Makes steps of rows of any shape: columns by paths, texts of several values, constants, order.
+//!
+//! A mapping is data: a file of a user or one in `assets/import`, and `--map` and `--set` on top of it.
 
 use std::collections::BTreeMap;
+use std::path::Path as FilePath;
+use std::sync::Arc;
 
-use arrow::array::{Array as _, ArrayRef, RecordBatch, new_null_array};
+use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray, new_null_array};
 use arrow::datatypes::DataType;
 use indexmap::IndexMap;
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::cell;
-use super::format::json::marked;
-use super::line;
-use super::table::{RowValues, Unreadable};
-use super::value::{LineValue, Node, whole};
+use super::arrays::{self, Node, Unreadable, array, plain};
+use super::format::Format;
+use super::json::marked;
+use super::value::Cell;
+use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::input;
+use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::domain::is_general;
 use mirrorstats_trace::schema::{Kind, column};
 
-#[derive(Clone, Debug, Default, PartialEq)]
+const LARGEST_FILE: Limit = Limit::new("bytes of a mapping file", 1 << 20);
+
+#[derive(Clone, Debug, Default)]
 pub struct Mapping {
-    columns: Vec<(String, Path)>,
-    constants: Vec<(String, Value)>,
-    left_out: BTreeMap<String, u64>,
-    dropped: BTreeMap<String, u64>,
+    pub format: Option<Format>,
+    /// The lists that hold the rows of an object, from the outside.
+    pub(super) lists: Vec<List>,
+    pub(super) settings: Settings,
+    columns: IndexMap<String, Source>,
+    /// True if an entry whose path is not in a table gives no column, instead of nulls.
+    is_built_in: bool,
 }
 
-pub(super) type Row<'a> = [(&'a str, &'a Value)];
-
-pub(super) struct MappedColumn<'m> {
-    pub(super) name: &'m str,
-    pub(super) values: RowValues,
-    path: Option<&'m Path>,
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MappingFile {
+    import: Settings,
 }
 
-/// The path to a value in a line: keys and positions separated by dots, and an integer to add to the value.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct Settings {
+    format: Option<String>,
+    rows: String,
+    /// A pattern of the ends of paths, such as `{model}/{level}/result.json`, whose parts are values of every row.
+    pub(super) path: String,
+    /// Values by which rows are left out.
+    pub(super) skip: IndexMap<String, Value>,
+    /// A prefix for the names of columns that no entry names.
+    pub(super) others: String,
+    /// The description of a file that the mapping reads, and values that it has.
+    pub(super) about: String,
+    pub(super) requires: IndexMap<String, Value>,
+    columns: IndexMap<String, Value>,
+}
+
+/// Values of a file for each of its rows, such as parts of its path.
+pub(super) type Given = IndexMap<String, String>;
+
+type Find<'a> = dyn Fn(&str) -> Option<ArrayRef> + 'a;
+
+/// A list of objects, and the name of its item in paths; without a name, the keys of the item alone.
+#[derive(Clone, Debug)]
+pub(super) struct List {
+    pub(super) key: String,
+    pub(super) item: String,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    Constant(Value),
+    /// A text of several values: literal parts, each before a value, and the last literal.
+    Text(Vec<(String, Path)>, String),
+    Value(Path, Change),
+    /// The position within the episode, by an integer or by the order of rows.
+    Order(Option<Path>),
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Change {
+    from: Option<String>,
+    value: Option<Value>,
+    start: Option<i64>,
+    scale: Option<f64>,
+    /// The unit of the scaled numbers, for readers of the file.
+    unit: Option<String>,
+    words: IndexMap<String, Value>,
+}
+
+/// The path to a value in a row: keys and positions separated by dots, and an integer to add to the value.
+#[derive(Clone, Debug)]
 struct Path {
     keys: String,
     added: i64,
 }
 
-/// A `--map` or `--set` without a column or a value.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{}`: expected {expected}, found {found}", visible(.typed))]
-pub struct MappingError {
-    typed: String,
-    expected: &'static str,
-    found: &'static str,
+/// How the steps of an episode are ordered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Order {
+    /// By their number `t`.
+    #[default]
+    Numbers,
+    /// By an integer, with any gaps.
+    Column,
+    Rows,
 }
 
-impl Mapping {
-    /// Parses columns from `COLUMN=PATH` and constants from `COLUMN=VALUE`.
-    pub fn parse(columns: &[String], constants: &[String]) -> Result<Self, MappingError> {
-        let path = |text: &str| match text.rsplit_once('+').map(|(keys, added)| (keys, added.parse())) {
-            Some((keys, Ok(added))) => Path { keys: keys.to_owned(), added },
-            _ => Path { keys: text.to_owned(), added: 0 },
-        };
-        let columns = columns.iter().map(|typed| pair(typed, "COLUMN=PATH").map(|(name, text)| (name, path(&text))));
-        let constants =
-            constants.iter().map(|typed| pair(typed, "COLUMN=VALUE").map(|(name, text)| constant(name, text)));
-        Ok(Self {
-            columns: columns.collect::<Result<_, _>>()?,
-            constants: constants.collect::<Result<_, _>>()?,
-            ..Self::default()
-        })
-    }
+/// A mapping that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{place}: expected {expected}, found {found}")]
+pub struct MappingError {
+    place: String,
+    expected: &'static str,
+    found: String,
+}
 
-    pub fn is_empty(&self) -> bool {
-        self.columns.is_empty() && self.constants.is_empty()
-    }
+/// What was left out, and how often.
+#[derive(Clone, Debug, Default)]
+pub struct Notes {
+    nested: BTreeMap<String, u64>,
+    dropped: BTreeMap<String, u64>,
+}
 
+impl Notes {
     /// A note for each key with lists or objects that were left out, and for each kind of record that is not a step.
-    pub fn left_out(&self) -> Vec<String> {
+    pub fn texts(&self) -> Vec<String> {
         let nested = |(key, rows): (&String, &u64)| {
             format!(
                 "left out: `{}`, a list or an object in {rows} lines; `--map COLUMN={0}.PATH` takes a value out of it",
@@ -78,153 +137,293 @@ impl Mapping {
             )
         };
         let dropped = |(what, count): (&String, &u64)| format!("left out: {count} {}", visible(what));
-        self.left_out.iter().map(nested).chain(self.dropped.iter().map(dropped)).collect()
+        self.nested.iter().map(nested).chain(self.dropped.iter().map(dropped)).collect()
     }
 
-    pub(super) fn declared(&self) -> Value {
-        let path =
-            |path: &Path| if path.added == 0 { path.keys.clone() } else { format!("{}+{}", path.keys, path.added) };
-        let columns: Map<String, Value> =
-            self.columns.iter().map(|(name, at)| (name.clone(), json!(path(at)))).collect();
-        let constants: Map<String, Value> = self.constants.iter().cloned().collect();
-        json!({ "map": columns, "set": constants })
+    pub(super) fn leave_out(&mut self, key: &str, rows: u64) {
+        *self.nested.entry(key.to_owned()).or_default() += rows;
     }
 
-    pub(super) fn count_dropped(&mut self, what: String) {
-        self.count_all_dropped(what, 1);
-    }
-
-    pub(super) fn count_all_dropped(&mut self, what: String, count: u64) {
+    pub(super) fn count(&mut self, what: String, count: u64) {
         if count > 0 {
             *self.dropped.entry(what).or_default() += count;
         }
     }
+}
+
+impl Mapping {
+    /// The mapping in this file, if there is one, with columns from `COLUMN=PATH` and constants from `COLUMN=VALUE`.
+    pub fn parse(file: Option<&FilePath>, columns: &[String], constants: &[String]) -> Result<Self, MappingError> {
+        let mut mapping = file.map(Self::read).transpose()?.unwrap_or_default();
+        for typed in columns {
+            let (name, path) = pair(typed, "COLUMN=PATH")?;
+            mapping.columns.insert(name.clone(), Source::Value(Path::parse(&path), Change::default()));
+            mapping.settings.columns.insert(name, path.into());
+        }
+        for typed in constants {
+            let (name, text) = pair(typed, "COLUMN=VALUE")?;
+            let value = constant(&name, text);
+            mapping.columns.insert(name.clone(), Source::Constant(value.clone()));
+            mapping.settings.columns.insert(name, value);
+        }
+        Ok(mapping)
+    }
+
+    fn read(path: &FilePath) -> Result<Self, MappingError> {
+        let text = input::text(path, LARGEST_FILE).map_err(|error| error.to_string());
+        text.and_then(|text| Self::of_text(&text)).map_err(|found| {
+            let expected = "a format, or a mapping file with `[import]`";
+            MappingError {
+                place: format!("--from {}", Input::new(path).name),
+                expected,
+                found: found.trim_end().into(),
+            }
+        })
+    }
+
+    pub(super) fn built_in(text: &str) -> Self {
+        let mapping = Self::of_text(text).expect("the tests read every mapping in `assets/import`");
+        Self { is_built_in: true, ..mapping }
+    }
+
+    fn of_text(text: &str) -> Result<Self, String> {
+        let MappingFile { import: settings } = toml::from_str(text).map_err(|error| error.to_string())?;
+        let known = |name: &String| Format::named(name).ok_or_else(|| format!("the unknown format `{name}`"));
+        let column = |(name, entry): (&String, &Value)| {
+            let source = Source::of(entry).map_err(|found| format!("{found} for the column `{name}`"))?;
+            Ok::<_, String>((name.clone(), source))
+        };
+        Ok(Self {
+            format: settings.format.as_ref().map(known).transpose()?,
+            lists: List::all(&settings.rows)?,
+            columns: settings.columns.iter().map(column).collect::<Result<_, _>>()?,
+            is_built_in: false,
+            settings,
+        })
+    }
+
+    /// This mapping on top of another one.
+    pub(super) fn over(&self, mut other: Self) -> Self {
+        other.columns.extend(self.columns.clone());
+        other
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty() && self.lists.is_empty()
+    }
+
+    /// The entries for the footer of a trace, as they were written.
+    pub(super) fn declared(&self) -> Value {
+        let is_constant = |name: &str| matches!(self.columns.get(name), Some(Source::Constant(_)));
+        let entries = self.settings.columns.clone().into_iter();
+        let (set, map): (Map<String, Value>, Map<_, _>) = entries.partition(|(name, _)| is_constant(name));
+        json!({ "map": map, "set": set })
+    }
+
+    pub(super) fn order(&self) -> Order {
+        match self.columns.get("t") {
+            Some(Source::Order(Some(_))) => Order::Column,
+            Some(Source::Order(None)) => Order::Rows,
+            _ => Order::Numbers,
+        }
+    }
 
     pub(super) fn reads(&self, keys: &str) -> bool {
-        self.columns.iter().any(|(_, path)| path.is_at(keys) || path.is_within(keys))
+        self.paths().any(|path| path == keys || is_within(path, keys))
     }
 
-    pub(super) fn flat(&mut self, row: &Row<'_>) -> IndexMap<String, LineValue> {
-        let mut flat: IndexMap<String, LineValue> =
-            self.columns.iter().map(|(name, path)| (name.clone(), path.value(name, row))).collect();
-        for (key, value) in row {
-            match value {
-                value if self.takes(key, value.is_array() || value.is_object()) => {}
-                Value::Array(_) | Value::Object(_) => self.leave_out(key, 1),
-                value => drop(flat.insert((*key).to_owned(), line::of_json(value))),
+    /// The parts of a file's path that the pattern names.
+    pub(super) fn parts_of_path(&self, path: &str) -> Given {
+        let part = |(pattern, part): (&str, &str)| {
+            let (before, rest) = pattern.split_once('{')?;
+            let (name, after) = rest.split_once('}')?;
+            Some((name.to_owned(), part.strip_prefix(before)?.strip_suffix(after)?.to_owned()))
+        };
+        self.settings.path.rsplit('/').zip(path.rsplit('/')).filter_map(part).collect()
+    }
+
+    /// The paths of all values that columns are made of.
+    pub(super) fn paths(&self) -> impl Iterator<Item = &str> {
+        self.columns.values().flat_map(Source::paths).map(|path| path.keys.as_str())
+    }
+
+    /// The rows of a table as steps. Errors: a column with a value that has no text.
+    pub(super) fn apply(&self, table: &RecordBatch, given: &Given) -> Result<RecordBatch, (String, Unreadable)> {
+        let (rows, mut columns) = (table.num_rows(), Vec::new());
+        let find = |key: &str| {
+            let given = || Some(array(vec![Cell::Spelled(given.get(key)?.into()); rows]));
+            table.column_by_name(key).cloned().or_else(given)
+        };
+        let is_constant = |source: &Source| matches!(source, Source::Constant(_));
+        for (name, source) in self.columns.iter().filter(|(_, source)| !is_constant(source)) {
+            let values = source.column(name, rows, &find).map_err(|error| (name.clone(), error))?;
+            match values {
+                None if self.is_built_in => {}
+                None => columns.push((name.clone(), new_null_array(&DataType::Null, rows))),
+                Some(values) => columns.push((name.clone(), values)),
             }
         }
-        flat.extend(self.constants());
-        flat
+        for (field, values) in table.schema_ref().fields().iter().zip(table.columns()) {
+            let is_left = self.is_empty() || !values.data_type().is_nested();
+            if is_left && !self.takes(field.name()) {
+                columns.push((field.name().clone(), plain(values).map_err(|error| (field.name().clone(), error))?));
+            }
+        }
+        for (name, source) in &self.columns {
+            if let Source::Constant(value) = source {
+                columns.push((name.clone(), array(vec![Cell::of_json(value); rows])));
+            }
+        }
+        Ok(arrays::table(columns, rows))
     }
 
-    /// The same for a row of cells.
-    pub(super) fn flat_cells(&self, row: &[(&str, LineValue)]) -> IndexMap<String, LineValue> {
-        let cell = |path: &Path| row.iter().find(|(key, _)| path.is_at(key)).map(|(_, cell)| cell.clone());
-        let mapped = self.columns.iter().map(|(name, path)| {
-            let found = cell(path).unwrap_or(LineValue::Null);
-            (name.clone(), path.finished(name, found))
-        });
-        let others =
-            row.iter().filter(|(key, _)| !self.takes(key, false)).map(|(key, cell)| ((*key).to_owned(), cell.clone()));
-        mapped.chain(others).chain(self.constants()).collect()
-    }
-
-    /// The same for the columns of a table. Errors: a column with a value that has no text.
-    pub(super) fn columns<'m>(
-        &'m self,
-        table: &'m RecordBatch,
-    ) -> Result<Vec<MappedColumn<'m>>, (&'m str, Unreadable)> {
-        let mapped = self.columns.iter().map(|(name, path)| (name.as_str(), Some(path), path.column(table)));
-        let schema = table.schema_ref().fields().iter().map(|field| field.name().as_str());
-        let others = schema.zip(table.columns());
-        let others = others.filter(|(name, values)| !values.data_type().is_nested() && !self.takes(name, false));
-        let others = others.map(|(name, values)| (name, None, Some(ArrayRef::clone(values))));
-        let is_free = |name: &str| !self.constants.iter().any(|(constant, _)| constant == name);
-        let columns = mapped.chain(others).filter(|(name, ..)| is_free(name));
-        let column = |(name, path, values): (&'m str, _, Option<ArrayRef>)| {
-            let values = values.unwrap_or_else(|| new_null_array(&DataType::Null, table.num_rows()));
-            let values = RowValues::new(&values).map_err(|unreadable| (name, unreadable))?;
-            Ok(MappedColumn { name, values, path })
+    /// Returns true if an entry takes the value of this key, or another value takes its name.
+    fn takes(&self, key: &str) -> bool {
+        // A part of a text is also a column of its own, and the numbers of a format stay beside those that count from 1.
+        let is_left = |source: &Source, path: &Path| match source {
+            Source::Text(..) => true,
+            _ => self.is_built_in && path.added != 0,
         };
-        columns.map(column).collect()
-    }
-
-    pub(super) fn constants(&self) -> impl Iterator<Item = (String, LineValue)> + '_ {
-        self.constants.iter().map(|(name, value)| (name.clone(), line::of_json(value)))
-    }
-
-    pub(super) fn leave_out(&mut self, key: &str, rows: u64) {
-        *self.left_out.entry(key.to_owned()).or_default() += rows;
-    }
-
-    /// Returns true if a path takes the value of this key, or another value takes its name.
-    fn takes(&self, key: &str, is_nested: bool) -> bool {
-        let takes = |path: &Path| path.is_at(key) || is_nested && path.is_within(key);
-        self.columns.iter().any(|(name, path)| name == key || takes(path))
+        let is_nested = key.contains(['.', '#']);
+        let takes =
+            |source: &Source| source.paths().any(|path| path.keys == key && (is_nested || !is_left(source, path)));
+        self.columns.iter().any(|(name, source)| name == key || takes(source))
     }
 }
 
-impl MappedColumn<'_> {
-    pub(super) fn at(&self, row: usize) -> Result<LineValue, Unreadable> {
-        let value = self.values.at(row)?;
-        Ok(match self.path {
-            Some(path) => path.finished(self.name, value),
-            None => value,
-        })
+impl List {
+    /// The lists in a text such as `samples[sample].epochs[]`.
+    fn all(text: &str) -> Result<Vec<Self>, String> {
+        let list = |part: &str| {
+            let (key, item) = part.trim_start_matches('.').split_once('[')?;
+            Some(Self { key: key.to_owned(), item: item.to_owned() })
+        };
+        let parts = text.split_inclusive(']').map(|part| list(part.strip_suffix(']')?));
+        parts.collect::<Option<_>>().ok_or_else(|| format!("`rows = \"{text}\"`, which is not of the form `steps[]`"))
+    }
+}
+
+impl Source {
+    fn of(entry: &Value) -> Result<Self, String> {
+        let change: Change = match entry {
+            Value::String(text) if text.contains('{') => return Self::text(text),
+            Value::String(path) => Change { from: Some(path.clone()), ..Change::default() },
+            Value::Object(_) => serde_json::from_value(entry.clone()).map_err(|error| error.to_string())?,
+            constant => return Ok(Self::Constant(constant.clone())),
+        };
+        match change {
+            Change { value: Some(value), from: None, .. } => Ok(Self::Constant(value)),
+            Change { from, start: Some(1), .. } => Ok(Self::Order(from.as_deref().map(Path::parse))),
+            Change { start: Some(_), .. } => Err("another `start` than 1, with which every trace begins,".to_owned()),
+            Change { from: Some(ref from), .. } => Ok(Self::Value(Path::parse(from), change)),
+            Change { .. } => Err("neither `from` nor `value`".to_owned()),
+        }
+    }
+
+    /// A text such as `{policy}/{task}`.
+    fn text(text: &str) -> Result<Self, String> {
+        let (mut parts, mut rest) = (Vec::new(), text);
+        while let Some((literal, after)) = rest.split_once('{') {
+            let (path, after) = after.split_once('}').ok_or("a `{` without `}`")?;
+            parts.push((literal.to_owned(), Path::parse(path)));
+            rest = after;
+        }
+        Ok(Self::Text(parts, rest.to_owned()))
+    }
+
+    fn paths(&self) -> impl Iterator<Item = &Path> {
+        let (one, several) = match self {
+            Self::Constant(_) | Self::Order(None) => (None, &[][..]),
+            Self::Value(path, _) | Self::Order(Some(path)) => (Some(path), &[][..]),
+            Self::Text(parts, _) => (None, parts.as_slice()),
+        };
+        one.into_iter().chain(several.iter().map(|(_, path)| path))
+    }
+
+    fn column(&self, name: &str, rows: usize, find: &Find<'_>) -> Result<Option<ArrayRef>, Unreadable> {
+        let cells = |path: &Path, change: &dyn Fn(Cell<'_>) -> Cell<'static>| {
+            let found = path.column(find)?;
+            Ok(found.map(|values| array((0..values.len()).map(|row| change(Cell::at(&values, row))))))
+        };
+        match self {
+            Self::Constant(_) => Ok(None),
+            Self::Order(None) => Ok(Some(Arc::new(Int64Array::from(vec![1; rows])))),
+            Self::Order(Some(path)) => cells(path, &|cell| path.finished(name, cell.typed(Kind::Int))),
+            Self::Value(path, change) if change.is_none() && path.added == 0 && !is_general_text(name) => {
+                path.column(find)
+            }
+            Self::Value(path, change) => cells(path, &|cell| path.finished(name, change.of(&cell))),
+            Self::Text(parts, end) => {
+                let columns = parts.iter().map(|(_, path)| path.column(find)).collect::<Result<Vec<_>, _>>()?;
+                let text = |row| {
+                    let value = |((literal, path), column): (&(String, Path), &Option<ArrayRef>)| {
+                        Some(format!("{literal}{}", path.added(Cell::at(column.as_ref()?, row)).text()?))
+                    };
+                    Some(parts.iter().zip(&columns).map(value).collect::<Option<String>>()? + end)
+                };
+                Ok(Some(Arc::new((0..rows).map(text).collect::<StringArray>())))
+            }
+        }
+    }
+}
+
+impl Change {
+    fn is_none(&self) -> bool {
+        self.scale.is_none() && self.words.is_empty()
+    }
+
+    /// The value of a word, in another unit: an integer if dividing by the factor gives the number again.
+    #[expect(clippy::float_cmp, reason = "that is the question")]
+    fn of<'a>(&'a self, cell: &Cell<'a>) -> Cell<'a> {
+        let word = cell.text().and_then(|text| self.words.get(&*text));
+        let cell = word.map_or_else(|| cell.clone(), Cell::of_json);
+        let number = cell.clone().typed(Kind::Float).float();
+        let Some((factor, number)) = self.scale.zip(number) else { return cell };
+        let product = (number * factor).round();
+        if product / factor == number { Cell::Float(product).typed(Kind::Int) } else { Cell::Float(number * factor) }
     }
 }
 
 impl Path {
-    fn is_at(&self, key: &str) -> bool {
-        self.keys == key
+    fn parse(text: &str) -> Self {
+        match text.rsplit_once('+').map(|(keys, added)| (keys, added.parse())) {
+            Some((keys, Ok(added))) => Self { keys: keys.to_owned(), added },
+            _ => Self { keys: text.to_owned(), added: 0 },
+        }
     }
 
-    fn is_within(&self, key: &str) -> bool {
-        self.keys.strip_prefix(key).is_some_and(|rest| rest.starts_with('.'))
-    }
-
-    fn value(&self, name: &str, row: &Row<'_>) -> LineValue {
-        let member = |key: &str| row.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
-        self.finished(name, within(member, &self.keys).map_or(LineValue::Null, line::of_json))
-    }
-
-    fn column(&self, table: &RecordBatch) -> Option<ArrayRef> {
-        within(|key| table.column_by_name(key).map(ArrayRef::clone), &self.keys)
+    fn column(&self, find: &Find<'_>) -> Result<Option<ArrayRef>, Unreadable> {
+        within(find, &self.keys).map(|values| plain(&values)).transpose()
     }
 
     /// The value with the number added. A number becomes text in columns that are text in every domain.
-    fn finished(&self, name: &str, found: LineValue) -> LineValue {
-        match self.added(found) {
-            LineValue::Unheld(number) if is_general_text(name) => LineValue::Text(number),
-            number @ (LineValue::Int(_) | LineValue::Float(_)) if is_general_text(name) => {
-                LineValue::Text(number.shown())
+    fn finished(&self, name: &str, found: Cell<'_>) -> Cell<'static> {
+        let value = self.added(found).into_owned();
+        match &value {
+            Cell::Unheld(_) | Cell::Int(_) | Cell::Float(_) if is_general_text(name) => {
+                Cell::Text(value.text().unwrap_or_default().into_owned().into())
             }
-            value => value,
+            _ => value,
         }
     }
 
-    fn added(&self, found: LineValue) -> LineValue {
-        if self.added == 0 {
-            return found;
+    fn added<'a>(&self, found: Cell<'a>) -> Cell<'a> {
+        match found.clone().typed(Kind::Int) {
+            Cell::Int(number) if self.added != 0 => {
+                let sum = i128::from(number) + i128::from(self.added);
+                i64::try_from(sum).map_or_else(|_| Cell::Unheld(sum.to_string().into()), Cell::Int)
+            }
+            _ => found,
         }
-        let number = match &found {
-            LineValue::Int(number) => Some(*number),
-            LineValue::Float(number) => whole(*number),
-            LineValue::Cell(text) => match cell::typed(text, Kind::Int) {
-                LineValue::Int(number) => Some(number),
-                _ => None,
-            },
-            _ => None,
-        };
-        let too_large = |number: i64| LineValue::Text(format!("{number}{:+}", self.added));
-        let sum = |number: i64| number.checked_add(self.added).map_or_else(|| too_large(number), LineValue::Int);
-        number.map_or(found, sum)
     }
 }
 
-pub(super) fn is_general_text(name: &str) -> bool {
+fn is_general_text(name: &str) -> bool {
     is_general(name) && column(name).is_some_and(|column| column.stored.kind() == Kind::String)
+}
+
+fn is_within(path: &str, key: &str) -> bool {
+    path.strip_prefix(key).is_some_and(|rest| rest.starts_with(['.', '[']))
 }
 
 impl Node for &Value {
@@ -237,7 +436,7 @@ impl Node for &Value {
     }
 }
 
-fn at<N: Node>(node: N, path: &str) -> Option<N> {
+pub(super) fn at<N: Node>(node: N, path: &str) -> Option<N> {
     if path.is_empty() {
         return Some(node);
     }
@@ -254,7 +453,8 @@ fn within<N: Node>(member: impl Fn(&str) -> Option<N>, path: &str) -> Option<N> 
 }
 
 fn pair(typed: &str, expected: &'static str) -> Result<(String, String), MappingError> {
-    let fault = |found| MappingError { typed: typed.to_owned(), expected, found };
+    let place = format!("`{}`", visible(typed));
+    let fault = |found: &str| MappingError { place: place.clone(), expected, found: found.to_owned() };
     let (name, text) = typed.split_once('=').ok_or_else(|| fault("no `=`"))?;
     if name.is_empty() || text.is_empty() {
         return Err(fault("nothing on one side of `=`"));
@@ -262,10 +462,10 @@ fn pair(typed: &str, expected: &'static str) -> Result<(String, String), Mapping
     Ok((name.to_owned(), text.to_owned()))
 }
 
-fn constant(name: String, text: String) -> (String, Value) {
-    let is_text = column(&name).is_some_and(|column| column.stored.kind() == Kind::String);
+fn constant(name: &str, text: String) -> Value {
+    let is_text = column(name).is_some_and(|column| column.stored.kind() == Kind::String);
     let scalar = serde_json::from_str(&marked(&text))
         .ok()
         .filter(|value: &Value| !(is_text || value.is_array() || value.is_object()));
-    (name, scalar.unwrap_or(Value::String(text)))
+    scalar.unwrap_or(Value::String(text))
 }

@@ -1,21 +1,22 @@
-//! A text of lines, or rows stored by their types, that is read twice: from start to end, then at known positions.
+//! An opened file of steps: its kind, its hash, and its rows once they are read.
 //!
-//! Input that cannot be read twice (standard input, a pipe) goes through a temporary file. A byte order mark and blank
-//! lines are skipped, but blank lines are counted. A line may end with `\n` or `\r\n`.
+//! Input that cannot be read twice (standard input, a pipe) and compressed files go through a temporary file.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek as _, SeekFrom};
+use std::io::{self, Read, Seek as _};
 use std::path::Path;
 use std::sync::Arc;
 
+use arrow::array::RecordBatch;
+use arrow::error::ArrowError;
 use serde_json::Value;
 
-use super::error::{Fault, ImportError, Location};
-use super::format::lerobot::data_set;
-use super::format::{Format, HEAD, RowSink};
-use super::line::{self, BYTE_ORDER_MARK, LONGEST_LINE, Line};
-use super::mapping::Mapping;
-use super::value::{LineValue, Members};
+use super::error::{Fault, Faults, ImportError, Location};
+use super::format::lerobot;
+use super::format::{Format, HEAD};
+use super::mapping::{Given, Mapping, Notes, Order};
+use super::rows::Rows;
+use super::spool::Spool;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::{hash, input};
 use mirrorstats_trace::inputs::{Input, NULL_FOLDER, folder_values};
@@ -23,25 +24,29 @@ use mirrorstats_trace::inputs::{Input, NULL_FOLDER, folder_values};
 #[derive(Debug)]
 pub struct Text {
     pub(super) name: Arc<str>,
-    noun: &'static str,
-    reader: BufReader<File>,
-    offset: u64,
-    lines: u64,
-    pub(super) folders: Members,
+    /// The path as it was typed, for patterns of mappings.
+    path: String,
+    file: File,
+    /// The columns in the names of folders.
+    pub(super) folders: Vec<(String, Option<String>)>,
     /// The hash of the file as it was compressed.
     sha256: Option<String>,
-    pub(super) source: Option<Source>,
+    pub(super) read: Option<Steps>,
 }
 
-/// A file of another shape, and the mapping of its rows to steps.
-#[derive(Clone, Debug)]
-pub(super) struct Source {
-    sha256: String,
+/// The steps of a text, which a mapping made of its rows.
+#[derive(Debug)]
+pub(super) struct Steps {
+    /// The hash of the source.
+    pub(super) sha256: String,
+    pub(super) noun: &'static str,
     pub(super) format: Format,
-    pub(super) mapping: Value,
+    /// The mapping for the footer; `None` for unmapped lines of steps.
+    pub(super) mapping: Option<Value>,
+    pub(super) order: Order,
+    pub(super) spool: Spool,
+    pub(super) faults: Faults,
 }
-
-const LENGTH: usize = size_of::<u32>();
 
 const fn most_inflated(bytes: u64) -> Limit {
     Limit::in_proportion("bytes inflated from a file of its size", 64 << 20, 96, bytes)
@@ -63,90 +68,91 @@ impl Text {
         let file = input::open_text(path).map_err(failed())?;
         let about = file.metadata().map_err(failed())?;
         let text = if about.is_file() { Self::of_file(&name, file).inflated()? } else { Self::spool(&name, file)? };
-        let cell = |value: Option<String>| value.map_or(LineValue::Null, LineValue::Cell);
-        let folders = folder_values(path).into_iter().map(|(name, value)| (name, cell(value))).collect();
-        Ok(Self { folders, ..text })
-    }
-
-    /// The text in a file that gzip or zstd compressed.
-    fn inflated(mut self) -> Result<Self, ImportError> {
-        let failed = || ImportError::read(&self.name);
-        let bytes = self.reader.get_ref().metadata().map_err(failed())?.len();
-        let mut start = [0; 4];
-        let read = self.reader.read(&mut start).map_err(failed())?;
-        self.reader.rewind().map_err(failed())?;
-        let stored = &mut self.reader;
-        let inflate: Box<dyn Read + '_> = match &start[..read] {
-            [0x1f, 0x8b, ..] => Box::new(flate2::read::MultiGzDecoder::new(stored)),
-            [0x28, 0xb5, 0x2f, 0xfd] => Box::new(zstd::stream::read::Decoder::with_buffer(stored).map_err(failed())?),
-            _ => return Ok(self),
-        };
-        let limit = most_inflated(bytes);
-        let mut file = tempfile::tempfile().map_err(failed())?;
-        let copied = io::copy(&mut inflate.take(limit.most().saturating_add(1)), &mut file);
-        copied.and_then(|bytes| limit.check(bytes).map_err(Into::into)).map_err(failed())?;
-        file.rewind().map_err(failed())?;
-        let sha256 = Some(self.hash()?);
-        Ok(Self { sha256, ..Self::of_file(&self.name, file) })
-    }
-
-    /// The format by the first bytes and the name.
-    pub fn format(&mut self) -> Result<Format, ImportError> {
-        self.rewind()?;
-        let mut head = Vec::new();
-        self.reader.by_ref().take(HEAD).read_to_end(&mut head).map_err(ImportError::read(&self.name))?;
-        self.rewind()?;
-        Ok(Format::detect(&self.name, &head))
-    }
-
-    /// The rows of a folder as lines of flat steps, in a temporary file; `None` if it is not a data set of `LeRobot`.
-    pub fn of_data_set(folder: &Path, mapping: &mut Mapping) -> Result<Option<Self>, ImportError> {
-        if !data_set::is_data_set(folder) {
-            return Ok(None);
-        }
-        let (name, format) = (Input::new(folder).name, Format::LeRobot);
-        let source = Source { sha256: data_set::hash_of(folder)?, format, mapping: mapping.declared() };
-        let mut rows = RowSink::new(&name, data_set::bytes_of(folder)?, &source.sha256, mapping)?;
-        data_set::read_folder(folder, &mut rows)?;
-        let rows = Self::of_file(&name, rows.finish()?);
-        Ok(Some(Self { noun: "row", source: Some(source), ..rows }))
+        Ok(Self { path: path.display().to_string(), folders: folder_values(path), ..text })
     }
 
     /// The rest of a stream, stored in a temporary file.
     pub fn spool(name: &str, stream: impl Read) -> Result<Self, ImportError> {
-        let mut file = tempfile::tempfile().map_err(ImportError::read(name))?;
-        let copied = io::copy(&mut stream.take(LARGEST_STREAM.most().saturating_add(1)), &mut file);
-        let checked = copied.and_then(|bytes| LARGEST_STREAM.check(bytes).map_err(Into::into));
-        checked.map_err(ImportError::read(name))?;
-        Self::of_file(name, file).inflated()
+        Self::of_file(name, copied(name, stream, LARGEST_STREAM)?).inflated()
     }
 
-    /// The rows of a file of this format, stored by their types in a temporary file.
-    pub fn mapped(mut self, format: Format, mapping: &mut Mapping) -> Result<Self, ImportError> {
-        let is_list = self.format()? == Format::JsonLines && self.begins_a_list()?;
-        let are_lines = format == Format::JsonLines && !is_list;
-        if are_lines && mapping.is_empty() {
-            return Ok(self);
+    /// The text in a file that gzip or zstd compressed.
+    fn inflated(mut self) -> Result<Self, ImportError> {
+        let name = Arc::clone(&self.name);
+        let failed = || ImportError::read(&name);
+        let limit = most_inflated(self.file.metadata().map_err(failed())?.len());
+        let head = self.head()?;
+        let inflate: Box<dyn Read + '_> = match head.first_chunk::<4>() {
+            Some([0x1f, 0x8b, ..]) => Box::new(flate2::read::MultiGzDecoder::new(&self.file)),
+            Some([0x28, 0xb5, 0x2f, 0xfd]) => Box::new(zstd::Decoder::new(&self.file).map_err(failed())?),
+            _ => return Ok(self),
+        };
+        let file = copied(&name, inflate, limit)?;
+        let sha256 = Some(self.hash()?);
+        Ok(Self { sha256, ..Self::of_file(&name, file) })
+    }
+
+    fn of_file(name: &str, file: File) -> Self {
+        Self { name: name.into(), path: String::new(), file, folders: Vec::new(), sha256: None, read: None }
+    }
+
+    /// The first bytes. The file is then at its start.
+    fn head(&mut self) -> Result<Vec<u8>, ImportError> {
+        let mut head = Vec::new();
+        let read = self.file.rewind().and_then(|()| (&self.file).take(HEAD).read_to_end(&mut head));
+        read.and_then(|_| self.file.rewind()).map_err(ImportError::read(&self.name))?;
+        Ok(head)
+    }
+
+    fn hash(&mut self) -> Result<String, ImportError> {
+        if let Some(known) = &self.sha256 {
+            return Ok(known.clone());
         }
-        let bytes = self.reader.get_ref().metadata().map_err(ImportError::read(&self.name))?.len();
-        let source = Source { sha256: self.hash()?, format, mapping: mapping.declared() };
-        let mut rows = RowSink::new(&self.name, bytes, &source.sha256, mapping)?;
-        if are_lines {
-            while let Some(line) = self.next_line()? {
-                rows.add_line(&line)?;
-            }
-        } else {
-            format.read(self.reader.into_inner(), &mut rows)?;
+        let hash = self.file.rewind().and_then(|()| hash::of_reader(&mut self.file));
+        hash.map_err(ImportError::read(&self.name))
+    }
+
+    /// Reads the rows of the file in this format, or else in that of its first bytes or its name.
+    pub fn read(&mut self, mapping: &Mapping, format: Option<Format>, notes: &mut Notes) -> Result<(), ImportError> {
+        let head = self.head()?;
+        let detect = || Format::detect(&self.name, &head, !mapping.lists.is_empty());
+        let format = format.or(mapping.format).unwrap_or_else(detect);
+        let effective = format.mapping(&head).map(|built_in| mapping.over(built_in));
+        let effective = effective.as_ref().unwrap_or(mapping);
+        let sha256 = self.hash()?;
+        let file = self.file.try_clone().map_err(ImportError::read(&self.name))?;
+        let bytes = file.metadata().map_err(ImportError::read(&self.name))?.len();
+        let given = effective.parts_of_path(&self.path);
+        let read = |rows: &mut Rows<'_>| format.read(file, rows);
+        self.read = Some(Steps::of((&self.name, bytes, sha256), (format, effective, mapping), given, notes, read)?);
+        Ok(())
+    }
+
+    /// The frames of a data set of `LeRobot`; `None` if the folder is none.
+    pub fn of_data_set(folder: &Path, mapping: &Mapping, notes: &mut Notes) -> Result<Option<Self>, ImportError> {
+        if !lerobot::is_data_set(folder) {
+            return Ok(None);
         }
-        let rows = Self::of_file(&self.name, rows.finish()?);
-        let noun = if are_lines { "line" } else { "row" };
-        Ok(Self { noun, folders: self.folders, source: Some(source), ..rows })
+        let (name, format) = (Input::new(folder).name, Format::LeRobot);
+        let source = (name.as_str(), lerobot::bytes_of(folder)?, lerobot::hash_of(folder)?);
+        let effective = mapping.over(format.mapping(b"PAR1").unwrap_or_default());
+        let read = |rows: &mut Rows<'_>| lerobot::read_folder(folder, rows);
+        let read = Steps::of(source, (format, &effective, mapping), Given::new(), notes, read)?;
+        let file = tempfile::tempfile().map_err(ImportError::read(&name))?;
+        Ok(Some(Self { read: Some(read), ..Self::of_file(&name, file) }))
+    }
+
+    /// The steps; those of plain lines if nothing else was asked for.
+    pub(super) fn steps(&mut self) -> Result<&mut Steps, ImportError> {
+        if self.read.is_none() {
+            self.read(&Mapping::default(), Some(Format::JsonLines), &mut Notes::default())?;
+        }
+        Ok(self.read.as_mut().expect("it was just read"))
     }
 
     /// The same fault, if the name of a folder says null, with that in its help.
     pub(super) fn of_folder(&self, fault: Fault) -> Fault {
-        let is_null =
-            |(name, value): &(String, LineValue)| Some(name) == fault.key.as_ref() && *value == LineValue::Null;
+        let is_null = |(name, value): &(String, Option<String>)| Some(name) == fault.key.as_ref() && value.is_none();
         if !self.folders.iter().any(is_null) {
             return fault;
         }
@@ -157,111 +163,47 @@ impl Text {
         Fault { help, ..fault }
     }
 
-    fn begins_a_list(&mut self) -> Result<bool, ImportError> {
-        let head = self.reader.fill_buf().map_err(ImportError::read(&self.name))?;
-        let head = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
-        Ok(head.trim_ascii_start().starts_with(b"["))
+    pub(super) fn batch(&self, batch: usize) -> Result<RecordBatch, ImportError> {
+        let none = || ArrowError::InvalidArgumentError("no rows were read".into());
+        self.read.as_ref().ok_or_else(none).and_then(|read| read.spool.read(batch)).map_err(self.failed())
     }
 
-    fn of_file(name: &str, file: File) -> Self {
-        let reader = BufReader::new(file);
-        Self {
-            name: name.into(),
-            noun: "line",
-            reader,
-            offset: 0,
-            lines: 0,
-            folders: Vec::new(),
-            sha256: None,
-            source: None,
-        }
+    pub(super) fn failed(&self) -> impl FnOnce(ArrowError) -> ImportError + use<> {
+        let failed = ImportError::read(&self.name);
+        move |error| failed(io::Error::other(error.to_string()))
     }
 
-    pub(super) fn place(&self, line: u64) -> Location {
-        Location { file: Arc::clone(&self.name), noun: self.noun, line }
-    }
-
-    pub(super) fn rewind(&mut self) -> Result<(), ImportError> {
-        self.reader.rewind().map_err(ImportError::read(&self.name))?;
-        (self.offset, self.lines) = (0, 0);
-        Ok(())
-    }
-
-    pub(super) fn hash(&mut self) -> Result<String, ImportError> {
-        if let Some(known) = self.source.as_ref().map(|source| &source.sha256).or(self.sha256.as_ref()) {
-            return Ok(known.clone());
-        }
-        self.rewind()?;
-        let hash = hash::of_reader(&mut self.reader).map_err(ImportError::read(&self.name))?;
-        self.rewind()?;
-        Ok(hash)
-    }
-
-    /// The next line that is not blank; `None` at the end of the text.
-    pub(super) fn next_line(&mut self) -> Result<Option<Line>, ImportError> {
-        loop {
-            let offset = self.offset;
-            let mut bytes = self.read_line()?;
-            if bytes.is_empty() {
-                return Ok(None);
-            }
-            self.lines += 1;
-            let ended = bytes.ends_with(b"\n");
-            self.strip(offset, &mut bytes);
-            if !bytes.trim_ascii().is_empty() || self.source.is_some() && !bytes.is_empty() {
-                let place = self.place(self.lines);
-                return Ok(Some(Line { place, offset, bytes, ended }));
-            }
-        }
-    }
-
-    pub(super) fn line_at(&mut self, offset: u64) -> Result<Vec<u8>, ImportError> {
-        let failed = || ImportError::read(&self.name);
-        if offset != self.offset {
-            // Seeking within the buffer costs nothing.
-            match i64::try_from(i128::from(offset) - i128::from(self.offset)) {
-                Ok(distance) => self.reader.seek_relative(distance).map_err(failed())?,
-                Err(_) => drop(self.reader.seek(SeekFrom::Start(offset)).map_err(failed())?),
-            }
-            self.offset = offset;
-        }
-        let mut bytes = self.read_line()?;
-        self.strip(offset, &mut bytes);
-        Ok(bytes)
-    }
-
-    pub(super) fn members(&self, bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
-        if self.source.is_some() { line::of_record(bytes) } else { line::members(bytes, ended) }
-    }
-
-    /// Removes what stands before the contents: the length of a stored row, or a byte order mark.
-    fn strip(&self, offset: u64, bytes: &mut Vec<u8>) {
-        if self.source.is_some() {
-            bytes.drain(..LENGTH);
-        } else if offset == 0 && bytes.starts_with(BYTE_ORDER_MARK) {
-            bytes.drain(..BYTE_ORDER_MARK.len());
-        }
-    }
-
-    /// The bytes of a line, or of a stored row behind its length; empty at the end.
-    fn read_line(&mut self) -> Result<Vec<u8>, ImportError> {
-        let bytes = match self.source {
-            Some(_) => record(&mut self.reader),
-            None => input::line(&mut self.reader, LONGEST_LINE),
-        };
-        let bytes = bytes.map_err(ImportError::read(&self.name))?;
-        self.offset += bytes.len() as u64;
-        Ok(bytes)
+    /// The place of a row of a batch.
+    pub(super) fn place(&self, batch: usize, row: usize) -> Location {
+        let read = self.read.as_ref();
+        let line = read.map_or(0, |read| read.spool.batches[batch].lines.at(row));
+        Location { file: Arc::clone(&self.name), noun: read.map_or("row", |read| read.noun), line }
     }
 }
 
-fn record(rows: &mut impl BufRead) -> io::Result<Vec<u8>> {
-    if rows.fill_buf()?.is_empty() {
-        return Ok(Vec::new());
+impl Steps {
+    /// The steps that `read` adds, by the mapping that was asked for, which may be on top of the format's own.
+    fn of(
+        (name, bytes, sha256): (&str, u64, String),
+        (format, effective, asked): (Format, &Mapping, &Mapping),
+        mut given: Given,
+        notes: &mut Notes,
+        read: impl FnOnce(&mut Rows<'_>) -> Result<(), ImportError>,
+    ) -> Result<Self, ImportError> {
+        given.insert("file#".to_owned(), sha256.chars().take(8).collect());
+        let mut rows = Rows::new(name, given, bytes, effective, notes)?;
+        read(&mut rows)?;
+        let is_plain = rows.is_strict && asked.is_empty();
+        let (noun, order, mapping) = (rows.noun, effective.order(), (!is_plain).then(|| asked.declared()));
+        let (spool, faults) = rows.finish()?;
+        Ok(Self { sha256, noun, format, mapping, order, spool, faults })
     }
-    let mut length = [0; LENGTH];
-    rows.read_exact(&mut length)?;
-    let mut bytes = vec![0; LENGTH + u32::from_le_bytes(length) as usize];
-    rows.read_exact(&mut bytes[LENGTH..])?;
-    Ok(bytes)
+}
+
+fn copied(name: &str, stream: impl Read, limit: Limit) -> Result<File, ImportError> {
+    let mut file = tempfile::tempfile().map_err(ImportError::read(name))?;
+    let copied = io::copy(&mut stream.take(limit.most().saturating_add(1)), &mut file);
+    let checked = copied.and_then(|bytes| limit.check(bytes).map_err(Into::into)).and_then(|()| file.rewind());
+    checked.map_err(ImportError::read(name))?;
+    Ok(file)
 }

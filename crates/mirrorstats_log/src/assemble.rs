@@ -14,7 +14,7 @@ use super::error::LogError;
 use super::message::EpisodeMessage;
 use super::read::Messages;
 use super::{METADATA, METADATA_KEY, topic};
-use mirrorstats_exact::replace::NewFile;
+use mirrorstats_exact::replace::{NewFile, folder_of};
 use mirrorstats_trace::episodes::episode::Episode;
 
 /// The order of a log's episodes: seed, run and repetition.
@@ -37,8 +37,7 @@ pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
 
 /// Merges these logs of one episode each into the log at `out`, which is replaced in one step.
 pub fn write(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
-    let file = NewFile::create(out).map_err(LogError::io("write", out))?;
-    replaced(file, out, recording, |log| copy_all(log, None, out, parts))
+    assemble(out, None, parts, recording, folder_of(out))
 }
 
 /// Merges the log `before`, if any, with these logs of one episode each. The result replaces `out` in one step; it is
@@ -51,36 +50,44 @@ pub fn assemble(
     recording: &Value,
     scratch: &Path,
 ) -> Result<(), LogError> {
-    let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
     let before = before.map(LogPart::open).transpose()?;
-    replaced(file, out, recording, |log| copy_all(log, before, out, parts))
+    replaced(scratch, out, recording, |log| {
+        let mut parts = parts.to_vec();
+        parts.sort();
+        let mut parts = parts.into_iter().peekable();
+        let copy = |part: &Path, log: &mut _| LogPart::open(part)?.copy_episode(log, out);
+        if let Some(mut before) = before {
+            while let Some(place) = before.place() {
+                while let Some((_, part)) = parts.next_if(|(of, _)| *of < place) {
+                    copy(&part, log)?;
+                }
+                while parts.next_if(|(of, _)| *of == place).is_some() {}
+                before.copy_episode(log, out)?;
+            }
+        }
+        parts.try_for_each(|(_, part)| copy(&part, log))
+    })
 }
 
 /// Rewrites the log at `path` without the episodes of these ids.
 #[cfg(feature = "view")]
 pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result<(), LogError> {
     let mut source = LogPart::open(path)?;
-    let file = NewFile::create(path).map_err(LogError::io("write", path))?;
-    replaced(file, path, recording, |log| {
+    replaced(folder_of(path), path, recording, |log| {
         while let Some((head, _)) = &source.begin {
-            if ids.contains(&head.episode_id) {
-                // Skip to the next begin.
-                source.begin = None;
-                source.advance()?;
-            } else {
-                source.copy_episode(log, path)?;
-            }
+            if ids.contains(&head.episode_id) { source.advance()? } else { source.copy_episode(log, path)? }
         }
         Ok(())
     })
 }
 
 fn replaced(
-    file: NewFile,
+    scratch: &Path,
     out: &Path,
     recording: &Value,
     add: impl FnOnce(&mut Writer<BufWriter<NewFile>>) -> Result<(), LogError>,
 ) -> Result<(), LogError> {
+    let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
     let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(out))?;
     let metadata = BTreeMap::from([(METADATA_KEY.to_owned(), recording.to_string())]);
     let metadata = Metadata { name: METADATA.to_owned(), metadata };
@@ -91,45 +98,16 @@ fn replaced(
     file.commit().map_err(LogError::io("write", out))
 }
 
-fn copy_all<W: Write + Seek>(
-    log: &mut Writer<W>,
-    mut before: Option<LogPart>,
-    out: &Path,
-    parts: &[(Place, PathBuf)],
-) -> Result<(), LogError> {
-    let mut parts = parts.to_vec();
-    parts.sort();
-    for (place, part) in &parts {
-        while let Some(earlier) = before.as_ref().and_then(LogPart::place).filter(|earlier| earlier <= place) {
-            if let Some(source) = &mut before {
-                source.copy_episode(log, out)?;
-            }
-            if earlier == *place {
-                break;
-            }
-        }
-        let is_written = before.as_ref().is_some_and(|source| source.last == Some(*place));
-        if !is_written {
-            LogPart::open(part)?.copy_episode(log, out)?;
-        }
-    }
-    while let Some(source) = before.as_mut().filter(|source| source.place().is_some()) {
-        source.copy_episode(log, out)?;
-    }
-    Ok(())
-}
-
 struct LogPart {
     path: PathBuf,
     messages: Messages,
     begin: Option<(Episode, Message<'static>)>,
-    last: Option<Place>,
 }
 
 impl LogPart {
     fn open(path: &Path) -> Result<Self, LogError> {
         let messages = Messages::open(path)?;
-        let mut source = Self { path: path.to_owned(), messages, begin: None, last: None };
+        let mut source = Self { path: path.to_owned(), messages, begin: None };
         source.advance()?;
         Ok(source)
     }
@@ -138,7 +116,9 @@ impl LogPart {
         self.begin.as_ref().map(|(head, _)| place(head))
     }
 
+    /// Moves to the begin of the next episode.
     fn advance(&mut self) -> Result<(), LogError> {
+        self.begin = None;
         while let Some(message) = self.messages.next().transpose()? {
             if let Some(EpisodeMessage::Begin(head)) = self.episode_message(&message)? {
                 self.begin = Some((*head, message));
@@ -165,7 +145,6 @@ impl LogPart {
             return Err(LogError::Damaged { file: self.path.display().to_string(), fault });
         }
         log.flush().map_err(LogError::writing(out))?;
-        self.last = Some(place(&head));
         self.advance()
     }
 

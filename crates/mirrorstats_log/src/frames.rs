@@ -184,8 +184,17 @@ fn add(moments: &mut BTreeMap<u64, Moment>, times: &BTreeSet<u64>, (topic, time,
 }
 
 fn shapes(data: &[u8]) -> Vec<SceneShape> {
-    let Ok(update) = SceneUpdate::decode(data) else { return Vec::new() };
-    let mut shapes: Vec<SceneShape> = update.entities.iter().flat_map(of_entity).collect();
+    SceneUpdate::decode(data).map_or_else(|_| Vec::new(), |update| of_entities(&update.entities))
+}
+
+/// The shapes of a world that has no log, as a log would have them.
+#[cfg(feature = "sim")]
+pub fn of_solids(solids: &[super::write::Solid]) -> Vec<SceneShape> {
+    of_entities(&solids.iter().map(|solid| super::write::entity(solid, None)).collect::<Vec<_>>())
+}
+
+fn of_entities(entities: &[SceneEntity]) -> Vec<SceneShape> {
+    let mut shapes: Vec<SceneShape> = entities.iter().flat_map(of_entity).collect();
     shapes.sort_by(|a, b| a.height.total_cmp(&b.height));
     shapes
 }

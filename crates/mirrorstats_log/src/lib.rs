@@ -28,6 +28,7 @@ pub mod message;
 pub mod read;
 mod records;
 pub mod recover;
+pub mod to_trace;
 #[cfg(feature = "sim")]
 pub mod write;
 

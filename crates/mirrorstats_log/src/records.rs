@@ -135,26 +135,24 @@ impl<R: Read + Seek> Records<R> {
     /// The records of the index; none if its checksum differs, since a reader trusts its positions.
     #[cfg(feature = "view")]
     pub(super) fn verified_summary(&mut self) -> io::Result<Vec<Record<'static>>> {
-        let Some((last, footer)) = self.footer()? else { return Ok(Vec::new()) };
+        let (last, footer) = self.footer()?;
         let counted = usize::try_from(last - footer.summary_start).unwrap_or(LONGEST) + FOOTER - 4;
         let is_sound = |bytes: &[u8]| footer.summary_crc == 0 || crc32fast::hash(bytes) == footer.summary_crc;
         if is_sound(&self.read(footer.summary_start, counted)?) { self.summary() } else { Ok(Vec::new()) }
     }
 
-    /// The position of the footer, and the footer.
-    fn footer(&mut self) -> io::Result<Option<(u64, Footer)>> {
+    /// The position of the footer, and the footer; without one, that of an empty index.
+    fn footer(&mut self) -> io::Result<(u64, Footer)> {
         let last = self.end.saturating_sub((FOOTER + MAGIC.len()) as u64);
         let footer = self.read(last, FOOTER)?;
         Ok(match footer.first().map(|opcode| decode(last, *opcode, &footer)) {
-            Some(Ok(RecordPiece::Record(Record::Footer(footer)))) if footer.summary_start < last => {
-                Some((last, footer))
-            }
-            _ => None,
+            Some(Ok(RecordPiece::Record(Record::Footer(footer)))) if footer.summary_start < last => (last, footer),
+            _ => (last, Footer { summary_start: last, ..Footer::default() }),
         })
     }
 
     pub(super) fn summary(&mut self) -> io::Result<Vec<Record<'static>>> {
-        let Some((last, footer)) = self.footer()? else { return Ok(Vec::new()) };
+        let (last, footer) = self.footer()?;
         let mut found = Vec::new();
         let mut at = footer.summary_start;
         while let Some(frame) = self.frame(at)?.filter(|_| at < last) {

@@ -48,7 +48,9 @@ pub struct Solid {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
-    /// A box with these edges; an edge of 0 makes it a plane.
+    /// A rectangle with these full sides along x and y, its front to +z.
+    Plane([f64; 2]),
+    /// A box with these edges.
     Box([f64; 3]),
     Sphere(f64),
     /// A capsule along z: the radius, and the length of the cylinder between its round ends.
@@ -209,13 +211,16 @@ fn transform(placed: &Placed, timestamp: Option<Timestamp>) -> FrameTransform {
 }
 
 /// One entity per shape with its name, so that the next step's entity replaces it.
-fn entity(solid: &Solid, timestamp: Option<Timestamp>) -> SceneEntity {
+pub(crate) fn entity(solid: &Solid, timestamp: Option<Timestamp>) -> SceneEntity {
     let [r, g, b, a] = solid.rgba.map(f64::from);
     let color = Some(Color { r, g, b, a });
     let pose = Some(Pose { position: Some(vector(solid.position)), orientation: Some(quaternion(solid.rotation)) });
     let mut entity =
         SceneEntity { timestamp, frame_id: ROOM.to_owned(), id: solid.name.clone(), ..SceneEntity::default() };
     match solid.form {
+        Form::Plane([width, height]) => {
+            entity.cubes.push(CubePrimitive { pose, size: Some(vector([width, height, 0.0])), color });
+        }
         Form::Box(edges) => entity.cubes.push(CubePrimitive { pose, size: Some(vector(edges)), color }),
         Form::Sphere(radius) => {
             entity.spheres.push(SpherePrimitive { pose, size: Some(vector([2.0 * radius; 3])), color });

@@ -59,6 +59,8 @@ pub struct KnownColumn {
     pub values: Vec<String>,
     /// The value in traces or rows that have none, if that is not null.
     pub fallback: Option<Fallback>,
+    /// The digits after the point that a float is rounded to, so that it can be a metric; it stays a float if absent.
+    pub decimals: Option<u8>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,9 +84,8 @@ pub struct Fallback {
 }
 
 impl KnownColumn {
-    /// A column of any value.
     pub const fn new(column: Column, origin: ColumnOrigin) -> Self {
-        Self { column, origin, values: Vec::new(), fallback: None }
+        Self { column, origin, values: Vec::new(), fallback: None, decimals: None }
     }
 
     pub(crate) const fn is_of_schema(&self) -> bool {
@@ -122,6 +123,13 @@ impl Columns {
         let name = name.into();
         if !self.known.get(&name).is_some_and(KnownColumn::is_of_schema) {
             self.known.insert(name, column);
+        }
+    }
+
+    /// Sets the decimals of a known column; nothing happens to an unknown one.
+    pub(crate) fn set_decimals(&mut self, name: &str, decimals: Option<u8>) {
+        if let Some(known) = self.known.get_mut(name) {
+            known.decimals = decimals;
         }
     }
 

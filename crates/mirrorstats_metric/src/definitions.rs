@@ -4,15 +4,16 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::bind::{self, Binding};
-use super::catalogs::catalog::{Better, Catalog, Experiment, Kind, Metric, by_order};
+use super::bind::{self, Binding, BoundMetric};
+use super::catalogs::catalog::{Better, Catalog, Control, DecimalColumn, Experiment, Kind, Metric, by_order};
 use super::catalogs::measure;
 use super::columns::{ColumnOrigin, Columns, KnownColumn, Level, Type};
 use super::file::{self, ColumnEntry, Document, FileError};
 use super::logical_plan::plan::{NodeId, Output, Plan};
+use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::ratio::Ratio;
-use mirrorstats_exact::suggest::nearest;
+use mirrorstats_exact::suggest::did_you_mean;
 use mirrorstats_toml_spec::{Fault, Faults, Source, Written};
 
 #[derive(Clone, Debug)]
@@ -33,6 +34,11 @@ impl Definitions {
     pub fn from_toml(name: &str, text: &str, columns: &Columns) -> Result<Self, FileError> {
         let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
         Ok(Self::check(file::read_source(name.to_owned(), source, None)?, columns, None)?)
+    }
+
+    /// Definitions without metrics that accept every experiment, for a scan that filters or counts.
+    pub fn without_metrics(columns: &Columns) -> Result<Self, Faults> {
+        Self::check(Document { name: "episodes".to_owned(), open: true, ..Document::default() }, columns, None)
     }
 
     pub fn filtered(self, shown: &str, condition: &str, columns: &Columns) -> Result<Self, Faults> {
@@ -73,7 +79,7 @@ impl Definitions {
 
     pub fn select(&mut self, names: &[String]) -> Result<(), UnknownMetric> {
         if let Some(name) = names.iter().find(|name| !self.catalog.metric.contains_key(*name)) {
-            return Err(UnknownMetric::new(name, self.catalog.metric.keys().cloned().collect()));
+            return Err(UnknownMetric::new(name, &self.catalog.metric.keys().cloned().collect::<Vec<_>>()));
         }
         self.plan.select(names);
         Ok(())
@@ -142,23 +148,22 @@ impl Definitions {
         let mut faults = declare(&document, &mut columns);
         faults.extend(experiment_faults(&document));
         faults.extend(measure::relation_faults(&document));
-        let binding = match bind::bind(&document, &columns, filter) {
-            Ok(binding) => {
-                faults.extend(level_faults(&document, &binding));
-                faults.extend(measure::faults(&document, |metric| binding.metrics[metric].1));
-                binding
-            }
-            Err(more) => {
-                faults.extend(more);
-                return Err(Faults(faults).in_order());
-            }
-        };
-        if !faults.is_empty() {
-            return Err(Faults(faults).in_order());
+        let binding = bind::bind(&document, &columns, filter).map_err(|more| faults.extend(more));
+        if let Ok(binding) = &binding {
+            faults.extend(level_faults(&document, binding));
+            faults.extend(duration_faults(&document, binding));
+            faults.extend(measure::faults(&document, |metric| binding.metrics[metric].kind));
         }
+        let Some(binding) = binding.ok().filter(|_| faults.is_empty()) else { return Err(Faults(faults).in_order()) };
         let catalog = catalog(&document, &binding);
         let mut plan = binding.plan;
-        let outputs = binding.metrics.into_iter().map(|(name, (node, kind))| Output { name, kind, node });
+        let output = |(name, bound): (String, BoundMetric)| Output {
+            name,
+            kind: bound.kind,
+            decimals: bound.decimals,
+            node: bound.node,
+        };
+        let outputs = binding.metrics.into_iter().map(output);
         plan.outputs = outputs.collect();
         plan.lets = binding.lets;
         plan.filter = binding.filter;
@@ -191,31 +196,23 @@ const fn per(level: Level) -> &'static str {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown metric `{name}`: {}", advice(.near.as_deref(), .known))]
+#[error("unknown metric `{name}`: {help}")]
 pub struct UnknownMetric {
-    pub name: String,
-    pub near: Option<String>,
-    pub known: Vec<String>,
+    name: String,
+    help: String,
 }
 
 impl UnknownMetric {
-    pub fn new(name: &str, known: Vec<String>) -> Self {
-        let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
-        Self { name: name.to_owned(), near, known }
-    }
-}
-
-fn advice(near: Option<&str>, known: &[String]) -> String {
-    match near {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("metrics are {}", known.join(", ")),
+    pub fn new(name: &str, known: &[String]) -> Self {
+        let near = did_you_mean(name, known.iter().map(String::as_str));
+        Self { name: name.to_owned(), help: near.unwrap_or_else(|| format!("metrics are {}", known.join(", "))) }
     }
 }
 
 /// Adds the columns that a document declares, unless they contradict the schema or the traces.
 fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     let mut faults = Vec::new();
-    for (name, ColumnEntry { place, column: declared, values, .. }) in &document.columns {
+    for (name, ColumnEntry { place, column: declared, values, decimals, .. }) in &document.columns {
         let known = columns.known(name);
         if name == "t" || known.is_some_and(|known| known.is_of_schema() && known.column != *declared) {
             let message = format!("`{name}` is a column of every trace and cannot be declared as another");
@@ -231,6 +228,7 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
         } else {
             let own = KnownColumn::new(*declared, ColumnOrigin::Own);
             columns.add(name.clone(), KnownColumn { values: values.clone(), ..own });
+            columns.set_decimals(name, *decimals);
         }
     }
     faults
@@ -244,9 +242,12 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
         let compared = entry.control.iter().flat_map(|(control, _, places)| control.on.iter().zip(places));
         let named = chance.chain(reference).chain(compared);
         faults.extend(named.filter_map(|(name, place)| document.unknown_metric(name, place)));
-        faults.extend(
-            entry.control.iter().filter_map(|(control, place, _)| document.not_controlled(own, &control.of, place)),
-        );
+        let Some((Control { of, .. }, place, _)) = &entry.control else { continue };
+        if of == own {
+            faults.push(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
+        } else {
+            faults.extend(document.unknown_experiment(of, place));
+        }
     }
     for (factor, places) in document.factors.values() {
         let named = factor.values.keys().zip(places);
@@ -255,17 +256,31 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
     faults
 }
 
+/// A duration counts steps: its methods count the episodes that still run at each of them.
+fn duration_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
+    let is_decimal = |name: &String| binding.metrics.get(name).is_some_and(|bound| bound.decimals > 0);
+    let durations = document.metrics.iter().filter(|(name, entry)| entry.said.finished.is_some() && is_decimal(name));
+    let fault = |(name, entry): (&String, &file::MetricEntry)| {
+        Fault::new(entry.finished.clone(), format!("the duration `{name}` has decimals; expected a number of steps"))
+            .help("leave out `finished`, or round it to whole steps: `round(x, 0)`")
+    };
+    durations.map(fault).collect()
+}
+
 fn level_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
     let metrics = document.metrics.iter().map(|(name, entry)| (name, entry.chance, &entry.place));
     let experiments = document.experiments.values().flat_map(|entry| {
-        let chance = entry.chance.iter().map(|(name, (level, place))| (name, *level, place));
+        let chance = entry.chance.iter();
+        let chance = chance.flat_map(|(name, (level, place))| {
+            level.iter().flat_map(Chance::levels).map(move |(_, level)| (name, Some(level), place))
+        });
         let reference = entry.reference.iter();
         chance.chain(reference.flat_map(|(name, (levels, place))| levels.iter().map(move |l| (name, Some(*l), place))))
     });
     let improbable = |level: Ratio| level.numerator() < 0 || level.numerator() > level.denominator();
     let mut faults = Vec::new();
     for (name, level, place) in metrics.chain(experiments) {
-        let is_rate = binding.metrics.get(name).is_some_and(|(_, kind)| *kind == Kind::Rate);
+        let is_rate = binding.metrics.get(name).is_some_and(|bound| bound.kind == Kind::Rate);
         if let Some(level) = level.filter(|level| is_rate && improbable(*level)) {
             let message = format!("the chance level of the rate `{name}` is {level}; expected a fraction from 0 to 1");
             faults.push(Fault::new(place.clone(), message));
@@ -282,6 +297,7 @@ fn catalog(document: &Document, binding: &Binding) -> Catalog {
         // A file that lists no experiments accepts all.
         open: document.open || document.experiments.is_empty(),
         lets: document.lets.iter().map(|(name, (written, _))| (name.clone(), written.text.clone())).collect(),
+        columns: decimal_columns(document),
         metric: metrics(document, binding),
         experiment: experiments(document),
         factor: document.factors.iter().map(|(name, (factor, _))| (name.clone(), factor.clone())).collect(),
@@ -297,14 +313,30 @@ fn content_hash(catalog: &Catalog) -> String {
     hash::of_bytes(text.as_bytes())
 }
 
+fn decimal_columns(document: &Document) -> IndexMap<String, DecimalColumn> {
+    let column = |(name, entry): (&String, &ColumnEntry)| {
+        let (ty, constant) = (entry.column.ty, entry.column.level == Level::Episode);
+        let column = DecimalColumn { ty, constant, decimals: entry.decimals?, unit: entry.unit.clone() };
+        Some((name.clone(), column))
+    };
+    document.columns.iter().filter_map(column).collect()
+}
+
 fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
     let metric = |(name, entry): (&String, &file::MetricEntry)| {
-        let kind = binding.metrics[name].1;
+        let bound = &binding.metrics[name];
+        let (kind, decimals) = (bound.kind, bound.decimals);
+        let default_unit = || match (&bound.unit, kind) {
+            (Some(unit), Kind::Quantity) => unit.clone(),
+            _ if decimals > 0 => String::new(),
+            _ => kind.default_unit().to_owned(),
+        };
         let said = entry.said.clone();
         let metric = Metric {
             title: said.title.unwrap_or_else(|| name.clone()),
             kind,
-            unit: said.unit.unwrap_or_else(|| kind.default_unit().to_owned()),
+            unit: said.unit.unwrap_or_else(default_unit),
+            decimals,
             better: said.better.unwrap_or(Better::Neither),
             section: said.section,
             help: said.help,
@@ -332,7 +364,7 @@ fn experiments(document: &Document) -> IndexMap<String, Experiment> {
             let experiment = Experiment {
                 title: entry.title.clone(),
                 order: entry.order.unwrap_or(position.saturating_add(1)),
-                chance: entry.chance.iter().map(|(name, (level, _))| (name.clone(), *level)).collect(),
+                chance: entry.chance.iter().map(|(name, (level, _))| (name.clone(), level.clone())).collect(),
                 reference: entry.reference.iter().map(|(name, (levels, _))| (name.clone(), levels.clone())).collect(),
                 is_declared: false,
                 control: entry.control.as_ref().map(|(control, ..)| control.clone()),

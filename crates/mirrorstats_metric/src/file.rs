@@ -8,12 +8,13 @@ use indexmap::IndexMap;
 
 use super::catalogs::catalog::{Control, Factor};
 use super::columns::{Column, Level};
-use super::shape::{DefinitionFile, ExperimentShape, MetricShape};
+use super::shape::{ColumnShape, DefinitionFile, ExperimentShape, MetricShape};
 use crate::columns::Type;
 use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::ratio::Ratio;
-use mirrorstats_exact::suggest::nearest;
+use mirrorstats_exact::suggest::did_you_mean;
 use mirrorstats_toml_spec::{At, Fault, Faults, FileKind, FileText, Part, Place, Source, Written};
 
 /// Definitions are written by hand, or by a program that spells out many similar metrics.
@@ -33,6 +34,9 @@ const KIND: FileKind = FileKind {
     most_keys: Limit::new("keys in a definition file", 10_000),
     most_includes: Limit::new("includes, those of included files counted", 256),
 };
+
+/// The most digits after the point of a column or of `round`: nanometres of a metre.
+pub(crate) const MOST_DECIMALS: u8 = 9;
 
 /// The domain of definitions that name none: the columns and rules of the mirror are known.
 const MIRROR: &str = "mirror";
@@ -63,6 +67,8 @@ pub struct ColumnEntry {
     /// The only texts in it, except null; any if empty.
     pub values: Vec<String>,
     pub unit: String,
+    /// The digits after the point of a float.
+    pub decimals: Option<u8>,
     pub help: String,
 }
 
@@ -84,7 +90,7 @@ pub struct ExperimentEntry {
     pub title: String,
     /// `order`; the position in the file if absent.
     pub order: Option<i64>,
-    pub chance: IndexMap<String, (Option<Ratio>, Place)>,
+    pub chance: IndexMap<String, (Option<Chance>, Place)>,
     pub reference: IndexMap<String, (Vec<Ratio>, Place)>,
     /// `control`, with the places of its experiment and of its metrics.
     pub control: Option<(Control, Place, Vec<Place>)>,
@@ -134,13 +140,6 @@ impl Document {
         unknown(&self.experiments, "experiment", name, place)
     }
 
-    pub(super) fn not_controlled(&self, own: &str, name: &str, place: &Place) -> Option<Fault> {
-        if name == own {
-            return Some(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
-        }
-        self.unknown_experiment(name, place)
-    }
-
     fn add(&mut self, at: &At<'_>, part: &Part, faults: &mut Vec<Fault>) {
         self.built_on.extend(part.built_in);
         let Some(file) = mirrorstats_toml_spec::read::<DefinitionFile>(at, "a definition file", faults) else { return };
@@ -156,10 +155,14 @@ impl Document {
                 let fault = at.key("values").item(0).fault("`values` lists the texts of a column that is not text");
                 faults.push(fault.help("give the column `type = \"text\"`, or leave the list out"));
             }
+            if said.decimals.is_some_and(|decimals| said.ty != Type::Float || decimals > MOST_DECIMALS) {
+                let message = format!("`decimals` needs a column of floats and a number from 0 to {MOST_DECIMALS}");
+                faults.push(at.key("decimals").fault(&message).help("an integer column is exact without it"));
+            }
             let level = if said.constant { Level::Episode } else { Level::Step };
             let column = Column { ty: said.ty, level };
-            let entry =
-                ColumnEntry { place: at.name_place(), column, values: said.values, unit: said.unit, help: said.help };
+            let ColumnShape { values, unit, decimals, help, .. } = said;
+            let entry = ColumnEntry { place: at.name_place(), column, values, unit, decimals, help };
             self.columns.insert(name, entry);
         }
         for ((name, said), (_, at)) in file.experiment.into_iter().zip(at.within("experiment")) {
@@ -179,9 +182,8 @@ fn unknown<T>(known: &IndexMap<String, T>, noun: &str, name: &str, place: &Place
     if known.contains_key(name) {
         return None;
     }
-    let near = nearest(name, known.keys().map(String::as_str));
-    let fault = Fault::new(place.clone(), format!("`{name}` is no {noun} of these definitions"));
-    Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
+    let near = did_you_mean(name, known.keys().map(String::as_str));
+    Some(Fault::new(place.clone(), format!("`{name}` is no {noun} of these definitions")).help_if(near))
 }
 
 impl MetricEntry {
@@ -203,22 +205,33 @@ impl MetricEntry {
     }
 }
 
+/// A chance level, or `None` for the word `none`; `None` at all if it is invalid.
+pub fn chance_level(at: &At<'_>, faults: &mut Vec<Fault>) -> Option<Option<Chance>> {
+    if at.written() == "none" {
+        return Some(None);
+    }
+    let mut strategies = at.entries().peekable();
+    if strategies.peek().is_none() {
+        return at.parse(faults).map(|level| Some(Chance::Of(level)));
+    }
+    let levels = strategies.map(|(name, at)| Some((name.to_owned(), at.parse(faults)?)));
+    levels.collect::<Option<_>>().map(|levels| Some(Chance::ByStrategy(levels)))
+}
+
 impl ExperimentEntry {
     fn new(said: ExperimentShape, at: &At<'_>, faults: &mut Vec<Fault>) -> Self {
-        let chance = at.within("chance").filter_map(|(metric, at)| {
-            let level = if at.written() == "none" { None } else { Some(at.parse(faults)?) };
-            Some((metric.to_owned(), (level, at.name_place())))
-        });
+        let chance = at
+            .within("chance")
+            .filter_map(|(metric, at)| Some((metric.to_owned(), (chance_level(&at, faults)?, at.name_place()))));
         let chance = chance.collect();
         let reference = at.within("reference").map(|(metric, at)| {
             let levels = at.items().filter_map(|level| level.parse(faults)).collect();
             (metric.to_owned(), (levels, at.name_place()))
         });
-        let places = |at: &At<'_>| (at.key("of").place(), at.within("on").map(|(_, at)| at.place()).collect());
-        let control = said.control.zip(at.get("control")).map(|(control, at)| {
-            let (of, on) = places(&at);
-            (control, of, on)
-        });
-        Self { title: said.title, order: said.order, chance, reference: reference.collect(), control }
+        let reference = reference.collect();
+        let control = said.control.zip(at.get("control"));
+        let control = control
+            .map(|(control, at)| (control, at.key("of").place(), at.within("on").map(|(_, at)| at.place()).collect()));
+        Self { title: said.title, order: said.order, chance, reference, control }
     }
 }

@@ -1,15 +1,12 @@
 //! The functions of the calculus: names, arities, documentation.
 
+use crate::logical_plan::plan::Aggregate;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Function {
-    First,
-    Last,
-    Any,
-    All,
-    Count,
-    Min,
-    Max,
-    Sum,
+    Of(Aggregate),
+    Mean,
+    Round,
     At,
     Lag,
     Length,
@@ -28,15 +25,17 @@ pub(super) struct Entry {
 
 const MANY: usize = usize::MAX;
 
-pub(super) const FUNCTIONS: [Entry; 15] = [
-    entry(Function::First, "first", "first(p): the t of the first step where p holds, or null", (1, 1)),
-    entry(Function::Last, "last", "last(p): the t of the last step where p holds, or null", (1, 1)),
-    entry(Function::Any, "any", "any(p): whether p holds at some step", (1, 1)),
-    entry(Function::All, "all", "all(p): whether p holds at every step", (1, 1)),
-    entry(Function::Count, "count", "count(p): at how many steps p holds", (1, 1)),
-    entry(Function::Min, "min", "min(x): the smallest x, or null", (1, 1)),
-    entry(Function::Max, "max", "max(x): the largest x, or null", (1, 1)),
-    entry(Function::Sum, "sum", "sum(x): the sum of an integer x, or null", (1, 1)),
+pub(super) const FUNCTIONS: [Entry; 17] = [
+    entry(Function::Of(Aggregate::First), "first", "first(p): the t of the first step where p holds, or null", (1, 1)),
+    entry(Function::Of(Aggregate::Last), "last", "last(p): the t of the last step where p holds, or null", (1, 1)),
+    entry(Function::Of(Aggregate::Any), "any", "any(p): whether p holds at some step", (1, 1)),
+    entry(Function::Of(Aggregate::All), "all", "all(p): whether p holds at every step", (1, 1)),
+    entry(Function::Of(Aggregate::Count), "count", "count(p): at how many steps p holds", (1, 1)),
+    entry(Function::Of(Aggregate::Min), "min", "min(x): the smallest x, or null", (1, 1)),
+    entry(Function::Of(Aggregate::Max), "max", "max(x): the largest x, or null", (1, 1)),
+    entry(Function::Of(Aggregate::Sum), "sum", "sum(x): the sum of an integer or decimal x, or null", (1, 1)),
+    entry(Function::Mean, "mean", "mean(x): the mean of x over the steps, with the digits of x, or null", (1, 1)),
+    entry(Function::Round, "round", "round(x, 3): the nearest number with 3 digits after the point", (2, 2)),
     entry(Function::At, "at", "at(x, t0): the value of x at timestep t0, or null", (2, 2)),
     entry(
         Function::Lag,

@@ -40,11 +40,10 @@ fn add(expr: &Expr, found: &mut Vec<String>) {
 fn parts(expr: &Expr) -> Vec<&Expr> {
     match &expr.kind {
         ExprKind::Name(_) | ExprKind::Literal(_) => Vec::new(),
-        ExprKind::Not(x) | ExprKind::Negate(x) => vec![x],
-        ExprKind::IsNull { operand, .. } | ExprKind::IsTruth { operand, .. } => vec![operand],
-        ExprKind::Binary(_, x, y) | ExprKind::Distinct { left: x, right: y, .. } => vec![x, y],
-        ExprKind::Between { operand, low, high, .. } => vec![operand, low, high],
-        ExprKind::InList { operand, list, .. } => std::iter::once(operand.as_ref()).chain(list).collect(),
+        ExprKind::Not(x) | ExprKind::Negate(x) | ExprKind::IsNull(x) | ExprKind::IsTruth(x, _) => vec![x],
+        ExprKind::Binary(_, x, y) | ExprKind::Distinct(x, y) => vec![x, y],
+        ExprKind::Between(x, [low, high]) => vec![x, low, high],
+        ExprKind::InList(x, list) => std::iter::once(x.as_ref()).chain(list).collect(),
         ExprKind::Case { operand, branches, otherwise } => {
             let branches = branches.iter().flat_map(|(when, then)| [when, then]);
             operand.as_deref().into_iter().chain(branches).chain(otherwise.as_deref()).collect()

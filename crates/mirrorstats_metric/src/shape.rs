@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 use super::catalogs::catalog::{Better, Control, Factor, Measures, StandardError, ValueRange};
 use super::columns::Type;
+use mirrorstats_exact::chance::NoLevel;
 use mirrorstats_exact::ratio::Ratio;
 
 /// A definition file.
@@ -51,9 +52,11 @@ pub struct ColumnShape {
     /// The only texts that it holds, null apart; any if absent.
     #[serde(default)]
     pub values: Vec<String>,
-    /// The unit of a number.
+    /// The unit of a number; a metric of its values has it too.
     #[serde(default)]
     pub unit: String,
+    /// On a float: its digits after the point, at most 9. It is rounded to them, and can then be a metric.
+    pub decimals: Option<u8>,
     /// For a reader of the column.
     #[serde(default)]
     pub help: String,
@@ -68,7 +71,8 @@ pub struct ExperimentShape {
     pub title: String,
     /// Its position among the experiments.
     pub order: Option<i64>,
-    /// Chance levels by metric, as fractions such as `1/3`; `none` where a metric's own level does not apply.
+    /// Chance levels by metric, as fractions such as `1/3`, or one for each strategy such as `{ guessing = "1/3",
+    /// disbelieving = "1/2" }`; `none` where a metric's own level does not apply.
     #[serde(default)]
     pub chance: IndexMap<String, ChanceLevel>,
     /// Reference levels by metric, where no chance level applies.
@@ -122,14 +126,8 @@ pub enum ChanceLevel {
     None(NoLevel),
     /// The level.
     Of(Fraction),
-}
-
-/// The word that says that there is no level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-pub enum NoLevel {
-    /// `none`.
-    #[serde(rename = "none")]
-    None,
+    /// The level of each blind strategy, by its name; the highest counts.
+    ByStrategy(IndexMap<String, Fraction>),
 }
 
 /// A fraction in quotes such as `1/3`, or a number.

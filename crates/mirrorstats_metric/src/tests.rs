@@ -12,6 +12,7 @@ pub(crate) fn schema_columns() -> Columns {
             origin: ColumnOrigin::Schema,
             values: column.values.iter().map(ToString::to_string).collect(),
             fallback: column.default.map(|expression| Fallback { expression, is_read: column.required }),
+            decimals: None,
         };
         Some((column.name, known))
     };

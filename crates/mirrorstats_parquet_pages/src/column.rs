@@ -302,7 +302,6 @@ pub(crate) fn all_within(keys: &[i32], count: usize) -> bool {
     keys.iter().map(|key| key.cast_unsigned()).max().is_none_or(|largest| (largest as usize) < count)
 }
 
-/// The text at a row of a dictionary; `None` for null.
 pub fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
     DictionaryTexts::of(column).at(row)
 }

@@ -15,8 +15,9 @@ use mirrorstats_log::message::Decision;
 use mirrorstats_log::recover::{Recovered, recover};
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::read::episode_rows::EpisodeRows;
 use mirrorstats_trace::write::OptionalColumns;
-use mirrorstats_trace::write::merge::{self, EpisodeRows};
+use mirrorstats_trace::write::merge;
 
 /// Rejects an existing log at `log` unless it has these episodes, recorded in this way; `trace` is the path of their
 /// trace, which need not exist.

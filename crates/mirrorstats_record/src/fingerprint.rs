@@ -59,20 +59,9 @@ impl Fingerprint {
 }
 
 fn hash_of(value: &Value) -> String {
-    hash::of_bytes(sorted(value).to_string().as_bytes())
-}
-
-/// The same value with its objects' keys sorted by bytes.
-fn sorted(value: &Value) -> Value {
-    match value {
-        Value::Object(members) => {
-            let mut members: Vec<_> = members.iter().map(|(key, value)| (key.clone(), sorted(value))).collect();
-            members.sort_by(|(a, _), (b, _)| a.cmp(b));
-            members.into_iter().collect()
-        }
-        Value::Array(values) => values.iter().map(sorted).collect(),
-        other => other.clone(),
-    }
+    let mut sorted = value.clone();
+    sorted.sort_all_objects();
+    hash::of_bytes(sorted.to_string().as_bytes())
 }
 
 #[cfg(test)]

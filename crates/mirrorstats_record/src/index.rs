@@ -15,16 +15,16 @@ use super::plan::Subject;
 use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows::{self, EpisodeRows};
 use mirrorstats_trace::read::open::TraceFile;
 use mirrorstats_trace::schema::RECORDING_KEY;
-use mirrorstats_trace::write::merge::{self, EpisodeRows};
 
 /// The recordings of one model and condition in a folder, which may be missing.
 #[derive(Debug)]
 pub struct RecordingIndex {
     folder: PathBuf,
-    subject: Subject,
-    recordings: Recordings,
+    pub(crate) subject: Subject,
+    pub(crate) recordings: Recordings,
 }
 
 /// The seed, run and repetition of an episode.
@@ -33,14 +33,6 @@ pub type Place = (i32, i32, i32);
 impl RecordingIndex {
     pub fn new(folder: &Path, subject: Subject, recordings: Recordings) -> Self {
         Self { folder: folder.to_owned(), subject, recordings }
-    }
-
-    pub(crate) const fn subject(&self) -> &Subject {
-        &self.subject
-    }
-
-    pub(crate) fn recording(&self, experiment: &Experiment) -> &Value {
-        self.recordings.get(experiment)
     }
 
     pub fn trace(&self, experiment: &Experiment) -> PathBuf {
@@ -63,7 +55,7 @@ impl RecordingIndex {
         let mut episodes = Vec::new();
         for path in trace.exists().then_some(trace).iter().chain(&parts) {
             self.check(experiment, path)?;
-            episodes.extend(merge::read(path)?);
+            episodes.extend(episode_rows::read(path)?);
         }
         // An episode both in the trace and as a part is the same one: the process ended between assembling the trace
         // and removing the part.
@@ -73,11 +65,11 @@ impl RecordingIndex {
     }
 
     pub(crate) fn check_log(&self, experiment: &Experiment, episodes: &[EpisodeRows]) -> Result<(), StoreError> {
-        continued::check(&self.log(experiment), &self.trace(experiment), self.recording(experiment), episodes)
+        continued::check(&self.log(experiment), &self.trace(experiment), self.recordings.get(experiment), episodes)
     }
 
     pub(crate) fn check(&self, experiment: &Experiment, path: &Path) -> Result<(), StoreError> {
-        let difference = difference(self.recording(experiment), &recording_of(path)?);
+        let difference = difference(self.recordings.get(experiment), &recording_of(path)?);
         difference.map_or(Ok(()), |difference| Err(StoreError::different(path, difference)))
     }
 

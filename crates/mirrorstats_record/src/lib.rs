@@ -12,7 +12,9 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod continued;
+pub mod environment;
 pub mod error;
+pub mod experiments;
 mod eyes;
 pub mod failures;
 pub mod fingerprint;

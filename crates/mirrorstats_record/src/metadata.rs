@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use mirrorstats_agents::{Player, reply};
 use mirrorstats_experiment::{Experiment, Spec};
 use mirrorstats_sim::config::WorldConfig;
-use mirrorstats_sim::scene::scene_version;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_sim::scene::SCENE_VERSION;
 use mirrorstats_trace::footers::declared::Registration;
+use mirrorstats_trace::schema::colors::Color;
 
 /// A key that grows with the recorded episodes.
 pub(super) const SEEDS: &str = "seeds";
@@ -57,7 +57,7 @@ fn recording(
         "kind": "recording",
         "design": { "pairs": "scene", "cluster": null },
         "condition": condition.unwrap_or("default"),
-        "scene_version": scene_version(config),
+        "scene_version": SCENE_VERSION,
         "experiment": experiment,
         "reply_schema_hash": reply::structure_hash(experiment),
         "palette": Color::ALL.map(Color::name),
@@ -68,7 +68,7 @@ fn recording(
         "world_hash": config.hash(),
     });
     if player.looks() {
-        recording["frame_digest"] = json!(mirrorstats_trace::episodes::frame::DIGEST);
+        recording["frame_digest"] = json!(mirrorstats_trace::frame::DIGEST);
     }
     if let Some(registration) = registration {
         recording["registration"] = json!(registration);

@@ -14,7 +14,8 @@ use mirrorstats_agents::human::journal;
 use mirrorstats_agents::locked;
 use mirrorstats_log::assemble;
 use mirrorstats_trace::beside::labels;
-use mirrorstats_trace::write::merge::{self, EpisodeRows};
+use mirrorstats_trace::read::episode_rows::{self, EpisodeRows};
+use mirrorstats_trace::write::merge;
 
 /// The removed episodes.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
@@ -82,7 +83,7 @@ fn remove_from(trace: &Path, code: &str, removed: &mut Removed) -> Result<(), Re
 /// The ids of a person's episodes, and the episodes of the others.
 fn parted(trace: &Path, code: &str) -> Result<(BTreeSet<String>, Vec<EpisodeRows>), RemovalError> {
     let (mut own, mut others) = (BTreeSet::new(), Vec::new());
-    for rows in merge::read(trace)? {
+    for rows in episode_rows::read(trace)? {
         if rows.episode()?.participant.as_deref() == Some(code) {
             own.insert(rows.episode_id);
         } else {

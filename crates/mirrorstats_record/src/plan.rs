@@ -3,6 +3,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::index::Place;
 use mirrorstats_experiment::{Experiment, built_in_names};
 
 /// Seeds and runs start at 1, as in the paper.
@@ -100,7 +101,6 @@ impl Plan {
         counts.into_iter().fold(self.experiments.len() as u64, u64::saturating_mul)
     }
 
-    /// The episodes of this shard, by experiment, seed, run and repetition.
     pub fn keys(&self) -> Vec<Key> {
         let (seeds, runs, repeats) = (self.seeds, self.runs, self.repeats);
         let all = self.experiments.iter().flat_map(move |experiment| {
@@ -110,6 +110,32 @@ impl Plan {
             })
         });
         all.enumerate().filter(|(at, _)| self.shard.has(*at)).map(|(_, key)| key).collect()
+    }
+}
+
+/// The planned episodes, and those that are not recorded yet, by experiment.
+#[derive(Clone, Debug)]
+pub struct Episodes {
+    pub planned: Vec<Key>,
+    pub todo: Vec<Key>,
+}
+
+impl Episodes {
+    /// `recorded` gives the seeds, runs and repetitions that an experiment already has.
+    pub fn of<E>(plan: &Plan, recorded: impl Fn(&Experiment) -> Result<BTreeSet<Place>, E>) -> Result<Self, E> {
+        let planned = plan.keys();
+        let mut todo = Vec::with_capacity(planned.len());
+        for experiment in &plan.experiments {
+            let done = recorded(experiment)?;
+            let own = planned.iter().filter(|key| key.experiment == *experiment);
+            todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))).cloned());
+        }
+        Ok(Self { planned, todo })
+    }
+
+    pub fn found(&self) -> Vec<Key> {
+        let todo: BTreeSet<&Key> = self.todo.iter().collect();
+        self.planned.iter().filter(|key| !todo.contains(key)).cloned().collect()
     }
 }
 

@@ -10,7 +10,6 @@ use super::plan::Key;
 use mirrorstats_agents::{Turn, locked};
 use mirrorstats_experiment::Experiment;
 
-/// The episodes of a recording that no thread has taken yet.
 #[derive(Debug)]
 pub(crate) struct Queue(Mutex<WaitingKeys>);
 
@@ -45,7 +44,6 @@ pub(crate) enum Next {
     Play(Key),
     /// Ask again later: the players of the remaining episodes are busy.
     Later,
-    /// None: all are taken.
     Nothing,
 }
 
@@ -98,7 +96,6 @@ impl Queue {
         waiting.count(&key.experiment);
     }
 
-    /// The experiments completed since the last call.
     pub(crate) fn complete(&self) -> Vec<(Experiment, Outcomes)> {
         std::mem::take(&mut locked(&self.0).complete)
     }

@@ -17,7 +17,6 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::episodes::episode::Step;
 use mirrorstats_trace::validate::replies::ReplyCounts;
 
-/// Characters of a reply to show.
 const SHOWN: usize = 200;
 
 /// Replies in order of arrival, from any thread.

@@ -15,12 +15,12 @@ use mirrorstats_experiment::spec::Side;
 use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_sim::scene::Scene;
-use mirrorstats_sim::visibility::{Visibility, by_column};
+use mirrorstats_sim::visibility::{self, Visibility};
 use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::{Episode, Extra, Step};
-use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_trace::episodes::palette::Color;
 use mirrorstats_trace::footers::renderer::Renderer;
+use mirrorstats_trace::frame::Frame;
+use mirrorstats_trace::schema::colors::Color;
 
 pub trait Observer {
     fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
@@ -42,6 +42,8 @@ pub struct EpisodeStage<'a> {
     /// The thread's camera; `None` if no pictures are needed.
     pub eye: Option<&'a RefCell<Camera>>,
     pub looks: bool,
+    /// False if the rays are cast when the episode has ended.
+    pub casts: bool,
     /// Set when the recording is to stop.
     pub stop: &'a AtomicBool,
 }
@@ -74,6 +76,13 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: &Key, subject: &Subject) -
         seed: key.seed,
         run: key.run,
         repetition: Some(key.repetition),
+        ..constants(scene)
+    }
+}
+
+/// The columns of an episode that its scene gives.
+pub(crate) fn constants(scene: &Scene) -> Episode {
+    Episode {
         body_color: scene.body_color.name().to_owned(),
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
         shown_color: scene.shown_color().map(|color| color.name().to_owned()),
@@ -124,7 +133,8 @@ pub async fn play(
             frame: frame.clone().unwrap_or_else(|| Arc::new(Frame::new(0, 0, Vec::new()))),
             fov_y: world.config().eye.fovy,
         };
-        let visibility = world.visibility();
+        let visibility = if stage.casts { world.visibility() } else { Visibility::default() };
+        observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
         let reply =
             agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: lost.step.or(Some(t)), lost })?;
         let action = reply.action;
@@ -144,7 +154,6 @@ pub async fn play(
         let mut row = row(world, key, t, &visibility, reply);
         world.scene().experiment.put(Side::Truth, &truths, &mut row.extra);
         row.extra.frame_digest = frame.as_ref().filter(|_| stage.looks).map(|frame| frame.digest());
-        observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
         bumped = world.act(action).bumped;
         // Dropping the observation first avoids a copy.
         drop(observation);
@@ -160,6 +169,18 @@ pub async fn play(
     Ok(Played { episode, model, other_model, is_reached: world.is_reached() })
 }
 
+/// Fills the columns of an episode that were played without rays.
+pub(crate) fn cast(world: &mut World, episode: &mut Episode) {
+    let condition = episode.condition.as_deref().unwrap_or("default");
+    for step in &mut episode.steps {
+        let visibility = world.visibility();
+        step.mirror_visible = world.is_mirror_visible(&visibility);
+        world.scene().experiment.put(Side::Truth, &world.truths(condition, &visibility), &mut step.extra);
+        step.extra = visibility::columns(world, &visibility, std::mem::take(&mut step.extra));
+        world.act(step.action);
+    }
+}
+
 fn look(stage: &EpisodeStage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {
     let Some(eye) = stage.eye else { return Ok(None) };
     let frame = eye.borrow_mut().frame(world).map_err(RecordError::fatal)?;
@@ -168,43 +189,33 @@ fn look(stage: &EpisodeStage<'_>, world: &World) -> Result<Option<Arc<Frame>>, R
 
 /// The row of a step, without `bumped`.
 fn row(world: &World, key: &Key, t: i32, visibility: &Visibility, mut reply: Reply) -> Step {
-    let counts = by_column(world, visibility);
-    let px = |column: &str| counts.iter().find(|(name, _)| *name == column).map(|(_, px)| *px);
-    let cube = reply.selected_cube.as_deref().and_then(Color::named);
-    let pose = world.pose();
     let extra = Extra {
-        mirror_self_px: px("mirror_self_px"),
-        mirror_other_px: px("mirror_other_px"),
-        mirror_px: px("mirror_px"),
-        direct_other_px: px("direct_other_px"),
-        pose_x: Some(narrowed(pose.x)),
-        pose_y: Some(narrowed(pose.y)),
-        pose_yaw: Some(narrowed(pose.heading.degrees())),
-        cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
-        mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
-        mirror_mark_px: px("mirror_mark_px"),
-        mirror_double_px: px("mirror_double_px"),
-        shown_px: px("shown_px"),
-        pane1_body_px: px("pane1_body_px"),
-        pane2_body_px: px("pane2_body_px"),
-        pane3_body_px: px("pane3_body_px"),
-        pane4_body_px: px("pane4_body_px"),
-        mark1_px: px("mark1_px"),
-        mark2_px: px("mark2_px"),
-        mark3_px: px("mark3_px"),
-        mark4_px: px("mark4_px"),
         reply: reply.raw.take(),
         latency_ms: reply.usage.latency_ms,
         prompt_tokens: reply.usage.prompt_tokens,
         completion_tokens: reply.usage.completion_tokens,
         cost_usd: reply.usage.cost_usd,
         frame_time: Some(frame_time(key.seed, key.run, key.repetition, t)),
-        ..Extra::default()
+        ..world_columns(world, visibility, reply.selected_cube.as_deref())
     };
     let (action, mirror_visible) = (reply.action, world.is_mirror_visible(visibility));
-    let mut step = Step { action, self_color: None, selected_cube: None, mirror_visible, extra };
+    let mut step = Step { action, mirror_visible, extra, ..Step::default() };
     reply.put(&world.scene().experiment, &mut step);
     step
+}
+
+/// The columns of a step that the world gives before the action; `cube` is the selected one.
+pub(crate) fn world_columns(world: &World, visibility: &Visibility, cube: Option<&str>) -> Extra {
+    let pose = world.pose();
+    let cube = cube.and_then(Color::named);
+    Extra {
+        pose_x: Some(narrowed(pose.x)),
+        pose_y: Some(narrowed(pose.y)),
+        pose_yaw: Some(narrowed(pose.heading.degrees())),
+        cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
+        mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
+        ..visibility::columns(world, visibility, Extra::default())
+    }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "seven digits of a room's metres are micrometres")]

@@ -31,11 +31,12 @@ use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 use mirrorstats_trace::episodes::episode_hash;
 
 pub trait Progress: Sync {
-    /// Receives a played step of an episode: its number, from 1, and its row.
     fn step(&self, episode: &Key, t: i32, row: &Step);
     fn episode(&self, key: &Key, id: &str, steps: usize);
     fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
     fn lost(&self, id: &str, reason: &str);
+    /// The view before a decision.
+    fn seen(&self, _: &Seen<'_>) {}
 }
 
 /// The seed of practice episodes; those of recordings are smaller.
@@ -52,24 +53,22 @@ pub struct Settings {
     /// True if frames are drawn and logged even for agents that do not look.
     pub frames: bool,
     pub log: bool,
+    /// False if the rays of an episode are cast at its end. There must be no log then, because a log has the counts.
+    pub casts: bool,
     /// The number of consecutive replies without a decision that ends the recording; `None` for no limit.
     pub max_unusable: Option<NonZeroU32>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Episodes recorded by this start.
     pub recorded: Vec<Key>,
-    /// The number of their steps.
     pub steps: u64,
     pub lost: Vec<(Key, LostEpisode)>,
-    /// Episodes under way when the recording was stopped.
     pub under_way: Vec<Key>,
     /// True if a spending limit stopped it.
     pub by_limit: bool,
     /// The number of episodes not played because their participants have left.
     pub left_out: usize,
-    /// True if the recording was stopped before its end.
     pub stopped: bool,
     /// The reason for the stop, if the agent could not answer.
     pub given_up: Option<GivenUp>,
@@ -212,7 +211,7 @@ impl Recording<'_> {
         Next::Nothing
     }
 
-    async fn episode(
+    pub(crate) async fn episode(
         &self,
         key: &Key,
         eye: Option<&RefCell<Camera>>,
@@ -221,12 +220,19 @@ impl Recording<'_> {
         let scene = Scene::draw(self.config, key.experiment.clone(), key.seed, key.run).map_err(RecordError::fatal)?;
         let mut episode = rollout::head(self.config, &scene, key, self.subject);
         let task = rollout::task(self.config, &scene, key);
+        let again = (!self.settings.casts).then(|| scene.clone());
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
-        episode.participant = agent.participant().map(str::to_owned);
-        let stage = EpisodeStage { config: self.config, eye, looks: self.player.looks(), stop: self.stop };
-        if agent.wants_practice() {
+        episode.participant = agent.person().map(|person| person.code().to_owned());
+        let stage = EpisodeStage {
+            config: self.config,
+            eye,
+            looks: self.player.looks(),
+            casts: self.settings.casts,
+            stop: self.stop,
+        };
+        if agent.person().is_some_and(|person| person.wants_practice()) {
             self.practise(&stage, agent.as_mut(), key).await?;
         }
         let log = if self.settings.log {
@@ -235,7 +241,11 @@ impl Recording<'_> {
             None
         };
         let mut observer = Observers { key, recording: self, unusable, in_a_row: 0, log };
-        let played = rollout::play(&stage, &mut world, agent.as_mut(), key, episode, &mut observer).await;
+        let mut played = rollout::play(&stage, &mut world, agent.as_mut(), key, episode, &mut observer).await;
+        if let (Ok(played), Some(scene)) = (&mut played, again) {
+            let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
+            rollout::cast(&mut world, &mut played.episode);
+        }
         let committed = match &played {
             Ok(played) => self.commit(&stage, key, played, observer.log),
             Err(_) => Ok(()),
@@ -250,10 +260,11 @@ impl Recording<'_> {
         let key = &Key::first(key.experiment.clone(), PRACTICE_SEED, 1);
         let scene = Scene::draw(self.config, key.experiment.clone(), key.seed, key.run).map_err(RecordError::fatal)?;
         let head = rollout::head(self.config, &scene, key, self.subject);
-        agent.practise(Some(rollout::task(self.config, &scene, key)));
+        let practise = |agent: &mut dyn Agent, task| agent.person().map(|person| person.practise(task));
+        practise(agent, Some(rollout::task(self.config, &scene, key)));
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
         rollout::play(stage, &mut world, agent, key, head, &mut Nobody).await?;
-        agent.practise(None);
+        practise(agent, None);
         Ok(())
     }
 
@@ -344,6 +355,7 @@ struct Observers<'a> {
 
 impl Observer for Observers<'_> {
     fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError> {
+        self.recording.progress.seen(seen);
         if let Some(log) = &mut self.log {
             let frame = seen.frame.filter(|_| self.recording.settings.frames);
             log.seen(&Seen { frame, ..*seen }).map_err(RecordError::fatal)?;

@@ -15,6 +15,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 
@@ -30,17 +31,18 @@ use mirrorstats_experiment::Experiment;
 use mirrorstats_log::{LogError, assemble};
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::footers::renderer::{self, Renderer};
+use mirrorstats_trace::read::episode_rows;
 use mirrorstats_trace::write::merge;
 use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 #[derive(Debug)]
 pub struct Store {
-    folder_lock: FolderLock,
+    folder_lock: Arc<FolderLock>,
     index: RecordingIndex,
 }
 
 impl Store {
-    pub fn new(folder_lock: FolderLock, subject: Subject, recordings: Recordings) -> Self {
+    pub fn new(folder_lock: Arc<FolderLock>, subject: Subject, recordings: Recordings) -> Self {
         let index = RecordingIndex::new(folder_lock.folder(), subject, recordings);
         Self { folder_lock, index }
     }
@@ -57,11 +59,11 @@ impl Store {
         self.index.log(experiment)
     }
 
-    fn part(&self, key: &Key) -> PathBuf {
-        self.parts().join(format!("{}.parquet", key.file_stem(self.index.subject())))
+    /// The file of an episode until the trace is assembled.
+    pub fn part(&self, key: &Key) -> PathBuf {
+        self.parts().join(format!("{}.parquet", key.file_stem(&self.index.subject)))
     }
 
-    /// The path of a committed log of an episode.
     pub(crate) fn log_part(&self, key: &Key) -> PathBuf {
         self.part(key).with_extension("mcap")
     }
@@ -70,10 +72,9 @@ impl Store {
         self.index.recorded(experiment)
     }
 
-    /// Updates the list of lost episodes: removes the recorded ones and adds those lost now.
     pub fn note_lost(&self, recorded: &[Key], lost: &[LostEpisode]) -> Result<(), StoreError> {
         let _writing = locked(&WRITING);
-        let recorded = recorded.iter().map(|key| key.episode_id(self.index.subject())).collect();
+        let recorded = recorded.iter().map(|key| key.episode_id(&self.index.subject)).collect();
         failures::update(&self.lost_list(), &recorded, lost)
     }
 
@@ -84,13 +85,13 @@ impl Store {
     /// The fingerprint of an episode, given the model's id as the provider returned it and the renderer of the frames
     /// that the agent saw.
     pub fn fingerprint(&self, key: &Key, model: Option<&str>, renderer: Option<&Renderer>) -> Fingerprint {
-        Fingerprint::new(self.index.recording(&key.experiment), model, renderer)
+        Fingerprint::new(self.index.recordings.get(&key.experiment), model, renderer)
     }
 
     /// Commits an episode whose log, if any, is already committed.
     pub fn commit(&self, key: &Key, episode: &Episode, fingerprint: &Fingerprint) -> Result<(), StoreError> {
         let path = self.part(key);
-        let mut recording = self.index.recording(&key.experiment).clone();
+        let mut recording = self.index.recordings.get(&key.experiment).clone();
         let columns = OptionalColumns::recorded(&recording);
         recording[FINGERPRINTS] = json!({ fingerprint.id.as_str(): fingerprint.parts });
         let metadata = TraceMetadata { recording: Some(recording), columns };
@@ -110,7 +111,7 @@ impl Store {
         let episodes = self.index.episodes(experiment)?;
         self.index.check_log(experiment, &episodes)?;
         let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
-        let mut recording = self.index.recording(experiment).clone();
+        let mut recording = self.index.recordings.get(experiment).clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
         recording[FINGERPRINTS] = Self::fingerprints(&trace, &parts)?;
@@ -150,7 +151,7 @@ impl Store {
         for part in parts {
             let log = part.with_extension("mcap");
             if log.exists() {
-                let episode = merge::read(part)?;
+                let episode = episode_rows::read(part)?;
                 logs.extend(episode.first().map(|episode| (place(episode), log)));
             }
         }

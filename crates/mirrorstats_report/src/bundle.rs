@@ -11,8 +11,7 @@ use std::path::{Component, Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::layout::MetricTable;
-use crate::layout::key_field;
+use crate::layout::{MetricTable, key_field};
 use crate::style::Style;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::number::full_precision;
@@ -128,9 +127,8 @@ impl Manifest {
         style: &Style,
         schema_version: u32,
         filter: Option<String>,
-        inputs: Vec<InputFile>,
+        mut inputs: Vec<InputFile>,
     ) -> Self {
-        let mut inputs = inputs;
         inputs.sort();
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -236,13 +234,17 @@ pub fn cells_csv(cells: &Cells) -> String {
     Table::of_texts(header).with(cells.all().map(cell_record)).csv()
 }
 
-fn cell_record(Cell { key, name, metric, moments, interval }: Cell) -> Vec<String> {
+fn cell_record(cell: Cell) -> Vec<String> {
+    cell.key.iter().map(key_field).chain([cell.name.to_owned()]).chain(cell_numbers(&cell)).collect()
+}
+
+/// The numbers of a cell from `n` on.
+pub(crate) fn cell_numbers(Cell { metric, moments, interval, .. }: &Cell) -> [String; 7] {
     let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
-    let mut record: Vec<String> = key.iter().map(key_field).collect();
-    record.extend([name.to_owned(), moments.n.to_string(), moments.sum.to_string(), moments.sum_sq.to_string()]);
-    record.extend([of(moments.mean()), of(moments.se(metric.se))]);
-    record.extend([of(interval.map(|i| i.low)), of(interval.map(|i| i.high))]);
-    record
+    let [sum, sum_sq] = metric.sums(moments).map(|sum| sum.to_string());
+    let [low, high] = [interval.map(|i| i.low), interval.map(|i| i.high)];
+    let [low, high] = [low, high].map(|bound| of(bound.map(|bound| metric.in_unit(bound))));
+    [moments.n.to_string(), sum, sum_sq, of(metric.mean(moments)), of(metric.standard_error(moments)), low, high]
 }
 
 fn check_paths(files: &[OutputFile]) -> Result<(), BundleError> {
@@ -256,24 +258,10 @@ fn check_paths(files: &[OutputFile]) -> Result<(), BundleError> {
     Ok(())
 }
 
-/// The needed part of a manifest; other versions may have more fields.
-#[derive(Deserialize)]
-struct Listed {
-    outputs: Vec<ListedOutput>,
-    /// Only distinguishes a report's manifest from other files of that name.
-    #[serde(rename = "schema_version")]
-    _schema_version: u32,
-}
-
-#[derive(Deserialize)]
-struct ListedOutput {
-    path: PathBuf,
-}
-
 /// The files of the report in a folder, including the manifest, by path inside it; empty without a manifest of a
 /// report.
 fn old_files(folder: &Path) -> Vec<PathBuf> {
-    let manifest = fs::read(folder.join(MANIFEST)).ok();
-    let Some(Ok(manifest)) = manifest.map(|text| serde_json::from_slice::<Listed>(&text)) else { return Vec::new() };
-    manifest.outputs.into_iter().map(|output| output.path).chain([MANIFEST.into()]).collect()
+    let text = fs::read(folder.join(MANIFEST)).unwrap_or_default();
+    let Ok(manifest) = serde_json::from_slice::<Manifest>(&text) else { return Vec::new() };
+    manifest.outputs.into_iter().map(|output| output.path.into()).chain([MANIFEST.into()]).collect()
 }

@@ -22,6 +22,11 @@ pub enum EngineError {
     ColumnType { column: String, found: String },
     #[error("`{metric}` overflows 64-bit integers: {reason}; use smaller numbers in its definition")]
     Overflow { metric: String, reason: String },
+    #[error(
+        "`{metric}` reads the number {value}; expected a finite number that fits 53 bits with {decimals} decimals; \
+         leave it out with `case`, or declare fewer decimals"
+    )]
+    NotADecimal { metric: String, value: String, decimals: u8 },
     #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 for each episode")]
     NotARate { metric: String, value: i64 },
 }

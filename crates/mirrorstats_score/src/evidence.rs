@@ -32,10 +32,11 @@ use super::score_traces::{check_work, failed, projection};
 use super::tables::builder::episode_ids;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_exact::suggest::nearest;
 use mirrorstats_metric::columns::{Level, Type};
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_metric::logical_plan::plan::{Aggregate, NodeId, Op, Plan};
+use mirrorstats_metric::logical_plan::plan::{Aggregate, NodeId, Op, Output, Plan};
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::EpisodeBatch;
 
@@ -56,7 +57,7 @@ pub struct MetricEvidence {
     /// The metric.
     pub metric: String,
     /// Its value; null where it is undefined.
-    pub value: Option<i64>,
+    pub value: Option<Decimal>,
     /// The timesteps that decided it, ascending.
     pub timesteps: Vec<i64>,
     /// The aggregates that it builds on.
@@ -110,7 +111,6 @@ pub fn explain_each(
     Ok(explained(traces, definitions, wanted, threads)?.0)
 }
 
-/// The evidence of the wanted episodes, and the names of all.
 fn explained(
     traces: &TraceSet,
     definitions: &Definitions,
@@ -176,7 +176,7 @@ impl<'a> Reader<'a> {
         let values = self.plan.evaluate(&Batch { segments, steps: &steps, texts: &texts, episodes: &episodes })?;
         let reading = Reading { reader: self, values, segments };
         let outputs = self.definitions.plan.outputs.iter();
-        let metrics = outputs.map(|output| reading.metric(&output.name, output.node)).collect();
+        let metrics = outputs.map(|output| reading.metric(output)).collect();
         Ok(Evidence { episode_id: episode_id.to_owned(), length: segments.lengths().value(0), metrics })
     }
 }
@@ -200,18 +200,20 @@ impl Reading<'_> {
         self.plan().node(node).ty
     }
 
-    fn metric(&self, name: &str, node: NodeId) -> MetricEvidence {
+    fn metric(&self, output: &Output) -> MetricEvidence {
+        let node = output.node;
         let values = self.of(node);
         let value = values.array().is_valid(0).then(|| match self.ty(node) {
             Type::Bool => i64::from(values.bools().value(0)),
             _ => values.ints().value(0),
         });
+        let value = value.map(|value| Decimal::of_units(value.into(), output.decimals.into()));
         let needed = self.plan().needed_by([self.decisive(node)]);
         let truths = self.truths(&needed);
         let fact = |id: NodeId| self.fact(id).or_else(|| truths.contains(&id).then(|| self.truth(id)));
         let facts: Vec<Fact> = needed.iter().filter_map(|id| fact(*id)).collect();
         let timesteps: BTreeSet<i64> = facts.iter().flat_map(|fact| fact.timesteps.iter().copied()).collect();
-        MetricEvidence { metric: name.to_owned(), value, timesteps: timesteps.into_iter().collect(), facts }
+        MetricEvidence { metric: output.name.clone(), value, timesteps: timesteps.into_iter().collect(), facts }
     }
 
     fn decisive(&self, node: NodeId) -> NodeId {

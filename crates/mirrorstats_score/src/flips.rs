@@ -53,7 +53,7 @@ pub fn score_pair(
         threads,
         |batch| {
             let values = plan.evaluate(&view(batch))?;
-            let scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
+            let scores = plan.scores.iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
             let explained = candidates.explained(batch, &values, &scores, &readers)?;
             Ok((scores, explained))
         },
@@ -74,7 +74,7 @@ struct Candidates {
 
 impl Candidates {
     fn of(plan: &PhysicalPlan) -> Self {
-        let [old, new] = plan.scores() else { unreachable!("the plan has two sets of definitions") };
+        let [old, new] = plan.scores.as_slice() else { unreachable!("the plan has two sets of definitions") };
         let differs = |old: &&Metric, new: &&Metric| old.name == new.name && old.step != new.step;
         let pairs =
             new.metrics.iter().filter_map(|new| Some((old.metrics.iter().find(|old| differs(old, &new))?, new)));

@@ -14,8 +14,9 @@ use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::tables::builder::{default_text, episode_ids};
-use super::tables::table::{CONDITION, UnusableCount};
+use super::tables::builder::episode_ids;
+use super::tables::table::{CONDITION, UnusableCount, default_text};
+use mirrorstats_trace::episodes::identification::UNREADABLE;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::EpisodeBatch;
 use mirrorstats_trace::schema::{self, Kind};
@@ -53,7 +54,7 @@ pub struct Quality {
     pub statuses: BTreeMap<String, u64>,
     /// Repairs by name; a reply with two is counted under both.
     pub repairs: BTreeMap<String, u64>,
-    /// The reason why replies gave no decision, in the words of their parser.
+    /// The reason why replies gave no decision or no identification, in the words of their parser.
     #[serde(skip)]
     pub faults: BTreeMap<String, u64>,
     /// Unusable and all replies of each episode with a reply.
@@ -88,7 +89,6 @@ impl Total {
         self.sum += value;
     }
 
-    /// The mean per reply; `None` without replies.
     #[expect(clippy::cast_precision_loss, reason = "a mean for people")]
     pub fn mean(self) -> Option<f64> {
         (self.replies > 0).then(|| self.sum as f64 / self.replies as f64)
@@ -110,8 +110,14 @@ impl Quality {
 
     /// The most frequent reason for replies without a decision, with its count; ties go to the alphabetically first.
     pub fn commonest_fault(&self) -> Option<(&str, u64)> {
-        let faults = self.faults.iter().map(|(fault, replies)| (fault.as_str(), *replies));
+        let faults = self.faults.iter().filter(|(fault, _)| !fault.starts_with(UNREADABLE));
+        let faults = faults.map(|(fault, replies)| (fault.as_str(), *replies));
         faults.max_by(|(a, few), (b, many)| few.cmp(many).then_with(|| b.cmp(a)))
+    }
+
+    /// The identifications that no rule reads, with their counts.
+    pub fn unread_identifications(&self) -> impl Iterator<Item = (&str, u64)> {
+        self.faults.iter().filter_map(|(fault, replies)| Some((fault.strip_prefix(UNREADABLE)?, *replies)))
     }
 
     pub fn of_status(&self, status: &str) -> u64 {
@@ -348,7 +354,6 @@ impl<'a> ReplyColumns<'a> {
     }
 }
 
-/// Passes the values of some rows, without nulls.
 fn each<T: ArrowPrimitiveType>(column: Option<&ArrayRef>, rows: Range<usize>, mut take: impl FnMut(T::Native)) {
     let Some(column) = column.and_then(|column| column.as_primitive_opt::<T>()) else { return };
     let values = column.values();

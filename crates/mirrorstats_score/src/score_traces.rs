@@ -82,7 +82,6 @@ pub struct Outputs<'a> {
     pub copy_candidates: bool,
 }
 
-/// The results of one scan.
 #[derive(Clone, Debug)]
 pub struct Scored {
     /// A table per definitions.
@@ -129,7 +128,7 @@ pub fn score_all(
         let condition = quality.constants().filter(|name| !projection.constants.contains(name));
         projection.constants.extend(condition);
     }
-    projection.prints = outputs.copy_candidates;
+    projection.row_hashes = outputs.copy_candidates;
     let mut headers: Vec<Header> = definitions.iter().map(|definitions| header(definitions, outputs.labels)).collect();
     // The prints are sorted like a metric, and then taken out.
     if let Some(first) = headers.first_mut().filter(|_| outputs.copy_candidates) {
@@ -139,8 +138,8 @@ pub fn score_all(
     let mut quality = outputs.quality.map(|_| QualityByCell::default());
     let read = |batch: &EpisodeBatch| {
         let values = plan.evaluate(&view(batch))?;
-        let mut scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
-        if let Some((first, prints)) = scores.first_mut().zip(batch.prints.as_ref()) {
+        let mut scores = plan.scores.iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
+        if let Some((first, prints)) = scores.first_mut().zip(batch.row_hashes.as_ref()) {
             let kept = |episode: &usize| first.kept.as_ref().is_none_or(|kept| kept.value(*episode));
             let prints = (0..prints.len()).filter(kept).map(|episode| prints[episode].cast_signed());
             let prints = Int64Array::from_iter_values(prints);

@@ -19,6 +19,7 @@ pub fn schema_columns() -> Columns {
             values: column.values.iter().map(ToString::to_string).collect(),
             // A trace without a required column is an exception that its experiment declares.
             fallback: column.default.map(|expression| Fallback { expression, is_read: column.required }),
+            decimals: None,
         };
         Some((column.name, known))
     };

@@ -11,7 +11,6 @@ use mirrorstats_exact::names;
 use mirrorstats_experiment::angle::{Heading, Quaternion};
 use mirrorstats_experiment::spec::Body;
 
-/// The model of a kind of body.
 pub(super) struct BodyModel {
     pub(super) xml: &'static str,
     /// The parts that keep their own colour.
@@ -90,14 +89,12 @@ impl Figure {
         Self { pose, stride: Stride::Standing, steps: 0 }
     }
 
-    /// Moves to a pose, with the next half of a stride.
     pub(crate) const fn step_to(&mut self, pose: Pose) {
         self.steps = self.steps.wrapping_add(1);
         self.stride = if self.steps % 2 == 1 { Stride::Left } else { Stride::Right };
         self.pose = pose;
     }
 
-    /// Turns on the spot, with its limbs down.
     pub fn turn(&mut self, thirties: i8) {
         self.stride = Stride::Standing;
         self.pose.heading = self.pose.heading.turned(thirties);

@@ -13,8 +13,8 @@ use crate::label_image::Rectangle;
 use crate::model::{EYE_CAMERA, ModelError, PaintMode, Stage, TOP_CAMERA, compile, group};
 use crate::visibility;
 use crate::world::World;
-use mirrorstats_trace::episodes::frame::Frame;
 use mirrorstats_trace::footers::renderer::Renderer;
+use mirrorstats_trace::frame::Frame;
 
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {
@@ -43,19 +43,10 @@ pub struct Camera {
 
 impl Camera {
     pub fn new(config: &WorldConfig) -> Result<Self, CameraError> {
-        Self::sized(config, config.eye.width as usize, config.eye.height_px as usize)
+        Self::painted(config, PaintMode::Lit, config.eye.width as usize, config.eye.height_px as usize)
     }
 
-    pub fn sized(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
-        Self::painted(config, PaintMode::Lit, width, height)
-    }
-
-    pub(super) fn painted(
-        config: &WorldConfig,
-        paint: PaintMode,
-        width: usize,
-        height: usize,
-    ) -> Result<Self, CameraError> {
+    pub fn painted(config: &WorldConfig, paint: PaintMode, width: usize, height: usize) -> Result<Self, CameraError> {
         let model = Arc::new(compile(config, paint, [width, height])?);
         let renderer = MjRenderer::new(&model, width, height, 0)
             .map_err(|error| CameraError::NoDisplay { reason: reason(&error) })?;
@@ -91,11 +82,11 @@ impl Camera {
 
     /// Draws a stage, or only the geoms that may be in view: MuJoCo also draws things behind the eye, which takes most
     /// of its time.
-    pub(super) fn draw(&mut self, stage: &Stage, camera: &str, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
+    pub fn draw(&mut self, stage: &Stage, camera: &str, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
         let model = match in_view.filter(|_| !self.draws_all) {
-            None => Arc::clone(stage.shared_model()),
+            None => Arc::clone(&stage.model),
             Some(in_view) => {
-                let mut model = MjModel::clone(stage.shared_model());
+                let mut model = MjModel::clone(&stage.model);
                 let groups = model.geom_group_mut().iter_mut().zip(in_view);
                 groups.filter(|(_, is_in_view)| !**is_in_view).for_each(|(own, _)| *own = group::HIDDEN);
                 Arc::new(model)
@@ -105,7 +96,7 @@ impl Camera {
         self.data.mocap_pos_mut().copy_from_slice(stage.data.mocap_pos());
         self.data.mocap_quat_mut().copy_from_slice(stage.data.mocap_quat());
         self.data.forward();
-        let id = stage.model().name_to_id(MjtObjBase::mjOBJ_CAMERA, camera).expect("every model has this camera");
+        let id = stage.model.name_to_id(MjtObjBase::mjOBJ_CAMERA, camera).expect("every model has this camera");
         *self.renderer.camera_mut() = MjvCamera::new_fixed(id);
         self.renderer.opts_mut().geomgroup[CEILING] = u8::from(camera != TOP_CAMERA);
         let failed = |error: RendererError| CameraError::Failed { reason: reason(&error) };
@@ -131,7 +122,6 @@ const SOFTWARE: [&str; 4] = ["llvmpipe", "softpipe", "swrast", "SwiftShader"];
 /// The environment variable that limits the processor extensions used by Mesa.
 const LIMIT: &str = "GALLIUM_OVERRIDE_CPU_CAPS";
 
-/// The renderer of the context that is current on this thread.
 fn current_renderer() -> Renderer {
     let Some(mirrorstats_gl::Names { vendor, renderer, version }) = mirrorstats_gl::names() else {
         return Renderer { name: "unknown".to_owned(), version: None, vendor: None, processor: Some(processor()) };
@@ -141,7 +131,6 @@ fn current_renderer() -> Renderer {
     Renderer { name: renderer, version: Some(version), vendor: Some(vendor), processor }
 }
 
-/// The extensions of the processor, or the limit from the environment.
 fn processor() -> String {
     let limit = std::env::var(LIMIT).ok().filter(|limit| !limit.is_empty());
     let extensions = limit.map_or_else(extensions, |limit| format!("limited to {limit}"));

@@ -13,10 +13,10 @@ use crate::placement::Crowded;
 use crate::scene::Scene;
 use crate::world::World;
 use mirrorstats_experiment::Experiment;
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 
 #[derive(Debug, thiserror::Error)]
-pub enum ContactSheetError {
+pub enum DrawingError {
     #[error(transparent)]
     Crowded(#[from] Crowded),
     #[error(transparent)]
@@ -32,7 +32,7 @@ pub struct SheetPicture {
 
 /// An experiment from above; at the start; before the mirror, nearby and from the side, with every mark. The pictures use the
 /// experiment's settings.
-pub fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<Vec<SheetPicture>, ContactSheetError> {
+pub fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<Vec<SheetPicture>, DrawingError> {
     let eye = &mut Camera::new(&config.for_experiment(experiment))?;
     let scene = Scene::draw(config, experiment.clone(), seed, 1)?;
     let mut world = World::new(config, scene)?;
@@ -42,7 +42,8 @@ pub fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<V
         SheetPicture { frame: eye.top_view(&world)?, caption: format!("{name} from above; the own body is {color}") };
     let start = picture(eye, &world, "at the start")?;
     let [near, aside] = [(1.6, 0.0), (2.6, 0.9)].map(|(away, aside)| before_mirror(&world, away, aside));
-    let marked = world.scene().marks.iter().map(|mark| mark.from_t).max().unwrap_or(1);
+    let panes = world.scene().panes.iter().filter_map(|pane| pane.from_t);
+    let marked = world.scene().marks.iter().map(|mark| mark.from_t).chain(panes).max().unwrap_or(1);
     world.place_at(Figure::standing(near), marked);
     let near = picture(eye, &world, "before the mirror")?;
     world.place_at(Figure::standing(aside), marked);
@@ -50,7 +51,7 @@ pub fn row(config: &WorldConfig, experiment: &Experiment, seed: i32) -> Result<V
     Ok(vec![above, start, near, aside])
 }
 
-fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<SheetPicture, ContactSheetError> {
+fn picture(eye: &mut Camera, world: &World, place: &str) -> Result<SheetPicture, DrawingError> {
     let visibility = world.visibility();
     let mut caption = format!("{place}: own body {} px", visibility.self_px);
     if !visibility.marks.is_empty() {

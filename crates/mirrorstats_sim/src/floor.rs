@@ -49,7 +49,6 @@ impl Square {
     }
 }
 
-/// The distance of a point from a line between two others, m.
 pub(crate) fn distance_to_line(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
     let along = [to[0] - from[0], to[1] - from[1]];
     let length = along[0] * along[0] + along[1] * along[1];
@@ -60,7 +59,6 @@ pub(crate) fn distance_to_line(point: [f64; 2], from: [f64; 2], to: [f64; 2]) ->
     (gap[0] * gap[0] + gap[1] * gap[1]).sqrt()
 }
 
-/// The distance between two points, m.
 pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     let [dx, dy] = [a[0] - b[0], a[1] - b[1]];
     (dx * dx + dy * dy).sqrt()
@@ -83,7 +81,6 @@ impl FloorPlan {
             && self.squares.iter().all(|square| square.distance(spot) >= self.radius + clearance)
     }
 
-    /// Returns true if a body may go straight from one point to another.
     pub(crate) fn is_passable(&self, from: [f64; 2], to: [f64; 2]) -> bool {
         to.iter().all(|at| at.abs() <= self.reach)
             && self.squares.iter().all(|square| square.distance_to_line(from, to) >= self.radius)

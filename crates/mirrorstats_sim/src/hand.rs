@@ -5,7 +5,7 @@
 
 use super::body::Pose;
 use super::config::{WorldConfig, metres};
-use super::scene::{BEFORE_MIRROR, HandStart, Patch, Scene, in_room};
+use super::scene::{BEFORE_MIRROR, HandStart, Patch, Scene, in_room, manhattan};
 use mirrorstats_experiment::spec::{Hand, Part};
 use mirrorstats_trace::episodes::episode::Action;
 
@@ -23,7 +23,6 @@ pub(super) struct HandRules<'a> {
 }
 
 impl<'a> HandRules<'a> {
-    /// The units and limits in a scene; `None` without a hand.
     pub fn for_scene(scene: &Scene, config: &'a WorldConfig) -> Option<Self> {
         let patch = scene.marks.iter().find(|mark| mark.part == Part::Front)?.patch?;
         Some(Self { task: scene.experiment.hand?, patch, hand: scene.hand?, config, body: scene.start })
@@ -34,7 +33,6 @@ impl<'a> HandRules<'a> {
         [0, 1, 2].map(|axis| mark[axis] + step * f64::from(from_mark[axis]))
     }
 
-    /// Its middle in the room, m.
     pub fn center(&self, from_mark: [i32; 3]) -> [f64; 3] {
         in_room(self.body, self.local(from_mark))
     }
@@ -51,7 +49,7 @@ impl<'a> HandRules<'a> {
 
     /// The Manhattan distance to the mark, mm.
     pub fn distance_mm(&self, from_mark: [i32; 3]) -> u32 {
-        self.task.step_mm * from_mark.iter().map(|steps| steps.unsigned_abs()).sum::<u32>()
+        self.task.step_mm * manhattan(from_mark)
     }
 
     pub fn is_reached(&self, from_mark: [i32; 3]) -> bool {
@@ -59,7 +57,6 @@ impl<'a> HandRules<'a> {
     }
 }
 
-/// The step of a hand for an action; `None` for a body's actions.
 pub(super) fn step(action: Action) -> Option<[i32; 3]> {
     Some(match action {
         Action::HandForward => [1, 0, 0],

@@ -12,6 +12,7 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+pub mod blind;
 pub mod body;
 pub mod camera;
 pub mod config;
@@ -19,7 +20,6 @@ pub mod contact_sheet;
 pub mod distractor;
 pub mod floor;
 mod hand;
-pub mod label_camera;
 pub mod label_image;
 mod mirror_camera;
 pub mod mirror_eye;

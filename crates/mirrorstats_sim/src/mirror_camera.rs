@@ -10,7 +10,7 @@ use crate::scene::HungPane;
 use crate::visibility::{self, Shown};
 use crate::world::World;
 use mirrorstats_experiment::spec::{Look, PaneKind};
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 
 impl Camera {
     /// Draws the view through every visible pane into a frame; `whole` is all of the frame.
@@ -41,18 +41,12 @@ impl Camera {
         Ok(())
     }
 
-    pub(super) fn through(
-        &mut self,
-        stage: &Stage,
-        pane: &HungPane,
-        in_view: Option<&[bool]>,
-    ) -> Result<Frame, CameraError> {
+    pub fn through(&mut self, stage: &Stage, pane: &HungPane, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
         let frame = self.draw(stage, BEYOND_CAMERA, in_view)?;
         Ok(if pane.kind == PaneKind::Window { frame } else { flipped(&frame) })
     }
 }
 
-/// Copies the selected pixels of `over` to a frame of the same size.
 fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
     let pixels = frame.rgb.chunks_exact_mut(3).zip(over.rgb.chunks_exact(3)).enumerate();
     for (_, (pixel, seen)) in pixels.filter(|(at, _)| is_asked(*at)) {

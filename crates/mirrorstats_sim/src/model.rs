@@ -12,7 +12,8 @@
 mod dress;
 mod shadow;
 
-pub(super) use dress::labelled;
+pub(crate) use dress::HALF_BAR;
+pub use dress::labelled;
 
 use std::sync::Arc;
 
@@ -20,7 +21,7 @@ use mujoco_rs::prelude::{Attach, MjData, MjEditError, MjModel, MjSpec, MjtGeomBa
 
 use super::body::{BodyModel, Figure, Piece, Pose};
 use super::config::{LightsConfig, WorldConfig};
-use super::scene::{MOST_CUBES, MOST_OTHERS, Scene};
+use super::scene::{HungPane, MOST_CUBES, MOST_OTHERS, Scene};
 use mirrorstats_experiment::angle::{Heading, Quaternion, sine_cosine};
 use mirrorstats_experiment::spec::{MOST_MARKS, MOST_PANES, Part};
 
@@ -30,7 +31,7 @@ pub const AGENTS: usize = 1 + MOST_OTHERS;
 /// Humanoids in every model: those of the room, then one for each pane, which only that pane shows.
 pub(crate) const BODIES: usize = AGENTS + MOST_PANES;
 
-pub(crate) const EYE_CAMERA: &str = "eye";
+pub const EYE_CAMERA: &str = "eye";
 
 /// The camera for a pane: the eye's mirror image, or the eye in the second room.
 pub(crate) const BEYOND_CAMERA: &str = "beyond";
@@ -98,16 +99,23 @@ pub enum Sight {
     Through(usize),
 }
 
-/// The moving things at one moment.
+impl Sight {
+    pub(crate) fn pane(self, scene: &Scene) -> Option<(usize, &HungPane)> {
+        match self {
+            Self::Direct => None,
+            Self::Through(at) => Some((at, &scene.panes[at])),
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 pub struct SceneMoment {
-    /// The next step, from 1, which determines the visible marks.
+    /// The next step, from 1, which determines the visible marks and panes.
     pub t: u32,
     /// The humanoids by number; `None` for absent ones.
     pub bodies: [Option<Figure>; BODIES],
     /// The pose of the camera behind a pane.
     pub beyond: Option<Pose>,
-    /// The position of the hand, m; `None` without one.
     pub hand: Option<[f64; 3]>,
 }
 
@@ -116,14 +124,14 @@ pub struct SceneMoment {
 pub struct ModelError(#[from] MjEditError);
 
 pub struct Stage {
-    pub(super) data: MjData<Arc<MjModel>>,
-    model: Arc<MjModel>,
-    items: Vec<Item>,
+    pub data: MjData<Arc<MjModel>>,
+    pub(crate) model: Arc<MjModel>,
+    pub items: Vec<Item>,
     pieces: Vec<(usize, [f64; 3])>,
-    look: Sight,
+    pub(crate) look: Sight,
     beyond: usize,
     hand: usize,
-    marks_at: u32,
+    shown_at: u32,
 }
 
 impl Stage {
@@ -138,7 +146,7 @@ impl Stage {
     fn new(mut model: MjModel, config: &WorldConfig, paint: PaintMode, scene: &Scene, look: Sight) -> Self {
         let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom, scene)).collect();
         dress::dress(&mut model, &items, config, scene, look);
-        dress::show_marks(&mut model, &items, scene, 1, look);
+        dress::show_at(&mut model, &items, scene, 1, look);
         if paint == PaintMode::Labels {
             dress::label(&mut model, &items);
         }
@@ -152,42 +160,25 @@ impl Stage {
         let pieces = names.map(|name| moved(&name)).collect();
         let (beyond, hand) = (moved(BEYOND_CAMERA).0, moved(HAND).0);
         let model = Arc::new(model);
-        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, hand, marks_at: 1 }
+        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, hand, shown_at: 1 }
     }
 
-    fn show_marks(&mut self, scene: &Scene, t: u32) {
-        let shown = |t| scene.marks_at(t).count();
-        if shown(t) != shown(self.marks_at) {
+    fn show_at(&mut self, scene: &Scene, t: u32) {
+        if scene.shown_at(t) != scene.shown_at(self.shown_at) {
             let mut model = MjModel::clone(&self.model);
-            dress::show_marks(&mut model, &self.items, scene, t, self.look);
+            dress::show_at(&mut model, &self.items, scene, t, self.look);
             self.model = Arc::new(model);
             self.data.swap_model(Arc::clone(&self.model));
         }
-        self.marks_at = t;
-    }
-
-    pub const fn look(&self) -> Sight {
-        self.look
-    }
-
-    pub fn items(&self) -> &[Item] {
-        &self.items
-    }
-
-    pub(super) const fn shared_model(&self) -> &Arc<MjModel> {
-        &self.model
-    }
-
-    pub fn model(&self) -> &MjModel {
-        self.data.model()
+        self.shown_at = t;
     }
 
     pub fn is_shown(&self, geom: usize) -> bool {
-        self.data.model().geom_group()[geom] != group::HIDDEN
+        self.model.geom_group()[geom] != group::HIDDEN
     }
 
     pub fn show(&mut self, config: &WorldConfig, scene: &Scene, moment: &SceneMoment) {
-        self.show_marks(scene, moment.t);
+        self.show_at(scene, moment.t);
         self.pose(config, moment);
     }
 
@@ -210,12 +201,6 @@ impl Stage {
         }
         self.data.mocap_pos_mut()[self.hand] = moment.hand.unwrap_or([0.0, 0.0, FAR_BELOW]);
         self.data.forward();
-    }
-
-    /// The placement of every shown geom: its number, centre and rotation.
-    pub fn placed(&self) -> Vec<(usize, [f64; 3], [f64; 9])> {
-        let shown = (0..self.items.len()).filter(|geom| self.is_shown(*geom));
-        shown.map(|geom| (geom, self.data.geom_xpos()[geom], self.data.geom_xmat()[geom])).collect()
     }
 
     pub(super) fn piece_place(&self, number: usize) -> ([f64; 3], [f64; 4]) {
@@ -267,8 +252,8 @@ pub(super) fn compile(config: &WorldConfig, paint: PaintMode, size: [usize; 2]) 
         for wall in ["wall_east", "wall_north", "wall_west", "wall_south"] {
             spec.geom_mut(wall).expect("the room has this plane").set_material("panels");
         }
-        build_boxes(&mut spec, "frame", MOST_PANES * BARS, config.room.size, paint);
     }
+    build_boxes(&mut spec, dress::FRAME, MOST_PANES * BARS, config.room.size, paint);
     let largest = config.clutter.edges.iter().copied().fold(config.cubes.edge, f64::max);
     build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
     build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);

@@ -4,22 +4,28 @@
 //! everything restarts from the same stream. Acceptance depends only on comparisons, never on the order of a sum.
 
 mod balance;
+mod fit;
 mod mirrors;
 mod reach;
+mod ways;
+
+pub use fit::{Crowded, DoesNotFit, crowded};
+pub(crate) use reach::reachable;
+pub use ways::Ways;
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use super::body::Pose;
-use super::config::{WorldConfig, metres};
+use super::config::{EpisodeConfig, OthersConfig, WorldConfig};
 use super::floor::{FloorPlan, distance};
 use super::rng::Rng;
 use super::scene::{BEFORE_MIRROR, Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
 use mirrorstats_experiment::Experiment;
-use mirrorstats_experiment::angle::{HEADINGS, Heading, sine_cosine};
-use mirrorstats_experiment::spec::{Colors, Cubes, Hand, Layout, Occluders, Paint, Start, Wall};
+use mirrorstats_experiment::angle::{HEADINGS, Heading};
+use mirrorstats_experiment::spec::{Cubes, Occluders, Paint, Start, Wall};
 use mirrorstats_experiment::{Spec, number_of};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The maximum number of draws for one thing before everything restarts.
 const ATTEMPTS: u32 = 400;
@@ -27,123 +33,55 @@ const ATTEMPTS: u32 = 400;
 /// The maximum number of attempts at a whole scene.
 const DRAWINGS: u32 = 2000;
 
-/// An error: the room is too small for all that must be placed.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{} of seed {seed} and run {run} has no room for all its objects after {DRAWINGS} attempts: \
-     use a larger `room.size`, or fewer or smaller cubes and others",
-    experiment.name()
-)]
-pub struct Crowded {
-    experiment: Experiment,
-    seed: i32,
-    run: i32,
-}
-
 impl Scene {
-    /// Draws the scene of one episode. The experiment's lengths and counts override the configuration.
+    /// Draws the scene of one episode. The layout's counts override the configuration.
     pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
-        let config = &config.for_experiment(&experiment);
+        let config = &config.for_layout(&experiment.layout);
         let purpose = purpose(&experiment);
-        let body_color = body_color(&experiment, purpose, seed, run);
-        let mut chance = Rng::for_run(purpose, seed, run);
-        let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(&experiment, body_color));
-        let Some(scene) = drawn else { return Err(Crowded { experiment, seed, run }) };
+        let Some(scene) = drawn(config, &experiment, seed, run) else {
+            let why = unsolvable(config, &experiment, seed, run);
+            return Err(Crowded { experiment, seed, run, why });
+        };
         let layout = mirrors::PaneLayout { config, scene: &scene };
-        let mirrors::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
-        if experiment.hand.is_some() && hand.is_none() {
-            return Err(Crowded { experiment, seed, run });
-        }
-        Ok(Self { seed, run, stated_color, panes, marks, hand, ..scene })
+        let why = match (layout.extras(purpose, seed, run), experiment.hand) {
+            (Err(mirror), _) => DoesNotFit::overlap(mirror),
+            (Ok(mirrors::Extras { hand: None, .. }), Some(task)) => DoesNotFit::hand(task),
+            (Ok(mirrors::Extras { stated_color, panes, marks, hand }), _) => {
+                return Ok(Self { seed, run, stated_color, panes, marks, hand, ..scene });
+            }
+        };
+        Err(Crowded { experiment, seed, run, why })
     }
 }
 
-/// The reason why an experiment does not fit into a room.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DoesNotFit {
-    pub what: String,
-    pub help: String,
-    /// The mirror that is too wide, by its index in the file; `None` if something else has no room.
-    pub mirror: Option<usize>,
+/// A layout of this seed and run; `None` after too many attempts.
+fn drawn(config: &WorldConfig, experiment: &Experiment, seed: i32, run: i32) -> Option<Scene> {
+    let purpose = purpose(experiment);
+    let role = balance::Role::draw(experiment, purpose, seed, run);
+    let mut chance = Rng::for_run(purpose, seed, run);
+    let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(experiment, role));
+    drawn.map(|scene| balance::recolored(scene, role.color))
 }
 
-/// The reason why an experiment does not fit into a room, found by drawing a study of it; `None` if it fits.
-pub fn crowded(config: &WorldConfig, experiment: &Experiment) -> Option<DoesNotFit> {
-    let world = config.for_experiment(experiment);
-    let widest = world.room.size - 2.0 * world.placement.wall_margin;
-    let widths = experiment.panes.iter().map(|pane| pane.width_mm.map_or(world.mirror.width, metres));
-    if let Some((at, width)) = widths.enumerate().find(|(_, width)| *width > widest) {
-        return Some(DoesNotFit {
-            what: format!("a mirror of {width} m does not fit onto a wall of {} m", world.room.size),
-            help: format!("at most {widest} m, or a larger `room.size` in the world's configuration"),
-            mirror: Some(at),
-        });
-    }
-    let Crowded { seed, run, .. } =
-        study().find_map(|(seed, run)| Scene::draw(config, experiment.clone(), seed, run).err())?;
-    let (what, help) = match experiment.hand {
-        Some(Hand { least, most, step_mm, .. }) => (
-            format!(
-                "no place for the hand {least} to {most} steps of {} m from the mark, of seed {seed} and run {run}",
-                metres(step_mm)
-            ),
-            "hands begin at most 6 steps ahead of the mark, 5 aside and 5 above: another `step`, `least` or `most`",
-        ),
-        None => (
-            format!("no room for the cubes and others of seed {seed} and run {run}"),
-            "fewer cubes or others, or a larger `room.size` in the world's configuration",
-        ),
+/// The reason why no layout is found: too few steps, or else too little room.
+fn unsolvable(config: &WorldConfig, experiment: &Experiment, seed: i32, run: i32) -> DoesNotFit {
+    let (steps, default) = (config.episode.steps, WorldConfig::default().episode.steps);
+    let fits = |steps: &u32| {
+        let longer = WorldConfig { episode: EpisodeConfig { steps: *steps }, ..config.clone() };
+        drawn(&longer, experiment, seed, run).is_some()
     };
-    Some(DoesNotFit { what, help: help.to_owned(), mirror: None })
+    if steps >= default || !fits(&default) {
+        let what = format!("no room for all its objects after {DRAWINGS} attempts");
+        return DoesNotFit::new("cubes", what, "use a larger `room.size`, or fewer or smaller cubes and others");
+    }
+    let enough = (steps / 10 + 1..default / 10).map(|tens| 10 * tens).find(fits).unwrap_or(default);
+    let what = format!("no scene that can be solved in {steps} steps");
+    DoesNotFit::new("steps", what, format!("use `episode.steps = {enough}` or more in the world's configuration"))
 }
 
-fn study() -> impl Iterator<Item = (i32, i32)> {
+/// The seeds and runs of a study.
+pub(crate) fn study() -> impl Iterator<Item = (i32, i32)> {
     (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)))
-}
-
-/// The occlusion by cubes, from the places before the mirror in a study's scenes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Occlusion {
-    pub places: usize,
-    /// Places from which at least half of the body is hidden.
-    pub hidden: usize,
-    /// The sum of the hidden shares of the body over all places.
-    pub shares: f64,
-}
-
-impl Occlusion {
-    fn of_shares(shares: &[f64]) -> Self {
-        Self {
-            places: shares.len(),
-            hidden: shares.iter().filter(|share| **share <= 0.5).count(),
-            shares: shares.iter().map(|share| 1.0 - share).sum(),
-        }
-    }
-
-    /// The occlusion of an experiment in words; `None` without clutter, or if its scenes do not fit into the room.
-    pub fn described(config: &WorldConfig, experiment: &Experiment) -> Option<String> {
-        let has_clutter = matches!(experiment.layout.cubes, Cubes::Clutter { .. });
-        let Self { places, hidden, shares } = has_clutter.then(|| Self::measured(config, experiment)).flatten()?;
-        #[expect(clippy::cast_precision_loss, reason = "some hundred places")]
-        let [mean, half] = [shares, hidden as f64].map(|sum| 100.0 * sum / places as f64);
-        Some(format!(
-            "from the places before the first mirror, {mean:.1} % of the body is hidden on average, and half of it or more from \
-             {half:.1} % of them (21 scenes of the default world)"
-        ))
-    }
-
-    /// The occlusion of an experiment; `None` if its scenes do not fit into the room.
-    pub fn measured(config: &WorldConfig, experiment: &Experiment) -> Option<Self> {
-        study().try_fold(Self::default(), |sum, (seed, run)| {
-            let scene = Scene::draw(config, experiment.clone(), seed, run).ok()?;
-            let found = reach::occlusion(&config.for_experiment(experiment), &scene);
-            Some(Self {
-                places: sum.places + found.places,
-                hidden: sum.hidden + found.hidden,
-                shares: sum.shares + found.shares,
-            })
-        })
-    }
 }
 
 fn purpose(experiment: &Spec) -> u64 {
@@ -151,18 +89,6 @@ fn purpose(experiment: &Spec) -> u64 {
         toml::from_str(include_str!("../../../assets/world/streams.toml")).expect("the file comes with the program")
     });
     NUMBERED.get(&experiment.scenes).copied().unwrap_or_else(|| number_of(&experiment.scenes))
-}
-
-fn body_color(experiment: &Spec, purpose: u64, seed: i32, run: i32) -> Color {
-    let mut palette = experiment.layout.palette.clone();
-    match experiment.layout.colors {
-        Colors::Random => Rng::for_run(!purpose, seed, run).one_of(&palette),
-        Colors::Balanced => {
-            // A different order of colours for other scenes, equal for all of their seeds and runs.
-            shuffle(&mut palette, &mut Rng::from_number(purpose));
-            palette[balance::index(palette.len(), seed, run)]
-        }
-    }
 }
 
 fn shuffle(colors: &mut [Color], chance: &mut Rng) {
@@ -179,31 +105,34 @@ struct Drawing<'a> {
 
 impl Drawing<'_> {
     /// A layout without seed and run; `None` if a place was not found.
-    fn scene(&mut self, experiment: &Experiment, body_color: Color) -> Option<Scene> {
+    fn scene(&mut self, experiment: &Experiment, role: balance::Role) -> Option<Scene> {
         let layout = &experiment.layout;
         let mirror = self.mirror(layout.wall);
         let cubes = match layout.cubes {
             Cubes::None => Vec::new(),
-            Cubes::Candidates { count } => self.candidates(mirror, body_color, &layout.palette, count)?,
+            Cubes::Candidates { count } => self.candidates(mirror, &layout.palette, count)?,
             Cubes::Clutter { occluders, .. } => self.clutter(mirror, &layout.palette, occluders)?,
         };
         let plan = floor_plan(self.config, &cubes);
         let start = self.start(mirror, &plan, layout.start)?;
-        let others = self.others(&plan, start, body_color, layout)?;
-        let scene = Scene {
+        let mut scene = Scene {
             experiment: experiment.clone(),
             seed: 0,
             run: 0,
-            body_color,
+            body_color: cubes
+                .get(role.candidate)
+                .filter(|_| experiment.has_candidates())
+                .map_or(role.color, |cube| cube.color),
             stated_color: None,
             mirror,
             panes: Vec::new(),
             marks: Vec::new(),
             start,
             cubes,
-            others,
+            others: Vec::new(),
             hand: None,
         };
+        scene.others = self.others(&plan, &scene)?;
         if layout.start == Start::BeforeMirror {
             return Some(scene);
         }
@@ -230,17 +159,11 @@ impl Drawing<'_> {
         [self.length(-most, most), self.length(-most, most)]
     }
 
-    fn candidates(&mut self, mirror: MirrorPlace, body: Color, palette: &[Color], count: u32) -> Option<Vec<Cube>> {
-        let mut colors = vec![body];
-        while colors.len() < count as usize {
-            let color = self.chance.one_of(palette);
-            if !colors.contains(&color) {
-                colors.push(color);
-            }
-        }
+    fn candidates(&mut self, mirror: MirrorPlace, palette: &[Color], count: u32) -> Option<Vec<Cube>> {
+        let mut colors = palette.to_vec();
         shuffle(&mut colors, self.chance);
         let mut cubes = Vec::new();
-        for color in colors {
+        for color in colors.into_iter().take(count as usize) {
             cubes.push(self.candidate(mirror, color, &cubes)?);
         }
         Some(cubes)
@@ -305,7 +228,7 @@ impl Drawing<'_> {
             let [x, y] = mirror.center(self.config);
             return Some(Pose { x, y, heading: mirror.heading() }.ahead(-BEFORE_MIRROR));
         }
-        let spot = self.body_spot(plan, &[])?;
+        let spot = self.body_spot(plan, &[], |_| true)?;
         let blind: Vec<Heading> = (0..HEADINGS)
             .map(Heading::new)
             .filter(|heading| {
@@ -319,43 +242,59 @@ impl Drawing<'_> {
         Some(Pose { x: spot[0], y: spot[1], heading: self.chance.one_of(&blind) })
     }
 
-    fn body_spot(&mut self, plan: &FloorPlan, bodies: &[[f64; 2]]) -> Option<[f64; 2]> {
+    fn body_spot(
+        &mut self,
+        plan: &FloorPlan,
+        bodies: &[[f64; 2]],
+        is_there: impl Fn([f64; 2]) -> bool,
+    ) -> Option<[f64; 2]> {
         let clearance = self.config.placement.clearance;
         let margin = self.config.body.radius + self.config.mirror.gap + clearance;
         (0..ATTEMPTS).find_map(|_| {
             let spot = self.spot(margin);
-            let is_clear = plan.admits(spot, clearance)
+            let is_clear = is_there(spot)
+                && plan.admits(spot, clearance)
                 && bodies.iter().all(|body| distance(*body, spot) >= 2.0 * plan.radius + clearance);
             is_clear.then_some(spot)
         })
     }
 
-    fn others(&mut self, plan: &FloorPlan, start: Pose, body_color: Color, layout: &Layout) -> Option<Vec<Other>> {
-        let config = &self.config.others;
-        let [least, most] = [config.least, config.most].map(|count| i32::try_from(count).unwrap_or(i32::MAX));
+    fn others(&mut self, plan: &FloorPlan, scene: &Scene) -> Option<Vec<Other>> {
+        let OthersConfig { least, most, .. } = self.config.others;
         if most == 0 {
             return Some(Vec::new());
         }
-        let count = self.chance.between(least, most);
-        let paint = layout.others.color;
-        let has_twin = self.chance.happens(config.twin_percent) && paint.is_none();
-        let strangers: Vec<Color> = layout.palette.iter().copied().filter(|color| *color != body_color).collect();
-        let mut bodies = vec![start.spot()];
+        let count = least + self.chance.below(most - least + 1);
+        let mut bodies = vec![scene.start.spot()];
         let mut others = Vec::new();
-        for at in 0..count {
-            let color = match paint {
-                Some(Paint::Own) => body_color,
-                Some(Paint::Named(color)) => color,
-                None if at == 0 && has_twin => body_color,
-                Some(Paint::Other) | None => self.chance.one_of(&strangers),
-            };
-            let [x, y] = self.body_spot(plan, &bodies)?;
+        // The agent is in each place among the bodies before a mirror equally often, not in the middle most of the time.
+        let mut left = self.chance.below(count + 1);
+        for remaining in (1..=count).rev() {
+            let color = self.other_color(scene);
+            let is_left = self.chance.below(remaining) < left;
+            left -= u32::from(is_left);
+            let is_any_side = scene.experiment.layout.start != Start::BeforeMirror;
+            let [x, y] =
+                self.body_spot(plan, &bodies, |spot| is_any_side || is_left == (scene.mirror.aside(spot) > 0.0))?;
             bodies.push([x, y]);
             let heading = Heading::new(u8::try_from(self.chance.below(u32::from(HEADINGS))).ok()?);
             let habit = u32::try_from(self.chance.number() >> 32).ok()?;
             others.push(Other { color, start: Pose { x, y, heading }, habit });
         }
         Some(others)
+    }
+
+    /// A colour that does not depend on which candidate is the agent's, unless the experiment says that it does.
+    fn other_color(&mut self, scene: &Scene) -> Color {
+        let layout = &scene.experiment.layout;
+        let is_twin = self.chance.happens(self.config.others.twin_percent) && scene.experiment.has_candidates();
+        match layout.others.color {
+            Some(Paint::Own) => scene.body_color,
+            Some(Paint::Named(color)) => color,
+            Some(Paint::Other) => self.chance.one_of(&balance::strange_colors(scene)),
+            None if is_twin => self.chance.one_of(&scene.cubes).color,
+            None => self.chance.one_of(&layout.palette),
+        }
     }
 }
 
@@ -364,8 +303,7 @@ pub(super) fn is_in_view(config: &WorldConfig, mirror: MirrorPlace, pose: Pose) 
     const POINTS: i32 = 64;
     // Widens the view at its edge, so that a mirror that is nearly visible counts.
     const MARGIN: f64 = 0.05;
-    let (sine, cosine) = sine_cosine(config.eye.fovy / 2.0);
-    let widest = sine / cosine * f64::from(config.eye.width) / f64::from(config.eye.height_px);
+    let [widest, _] = config.eye.half_extent();
     let [facing_x, facing_y] = pose.heading.direction();
     let eye = pose.ahead(config.eye.forward);
     let [out_x, out_y] = mirror.heading().direction();

@@ -45,7 +45,6 @@ impl Rng {
         least.saturating_add_unsigned(self.below(span))
     }
 
-    /// True with a probability of `percent` in a hundred.
     pub fn happens(&mut self, percent: u32) -> bool {
         self.below(100) < percent
     }

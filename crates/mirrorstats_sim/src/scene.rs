@@ -15,27 +15,11 @@ use mirrorstats_exact::hash;
 use mirrorstats_exact::names;
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::angle::Heading;
-use mirrorstats_experiment::spec::{Body, PaneKind, Part};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_experiment::spec::{PaneKind, Part, is_default};
+use mirrorstats_trace::schema::colors::Color;
 
-/// Increases whenever the same configuration and seeds give other rooms or other motion.
-///
-/// 2: body colours are balanced, clutter hides more, faces are marked, lamps are fixed in the room.
-const ROOMS_VERSION: u32 = 2;
-
-/// The version of scenes with humanoids. Rooms and motion are those of version 2.
-const HUMANOIDS_VERSION: u32 = 3;
-
-/// The versions that this program draws.
-pub const SCENE_VERSIONS: [u32; 2] = [ROOMS_VERSION, HUMANOIDS_VERSION];
-
-/// The version of the scenes of a configuration. Recordings of mannequins go on with version 2.
-pub const fn scene_version(config: &WorldConfig) -> u32 {
-    match config.body.shape {
-        Body::Mannequin => ROOMS_VERSION,
-        Body::Humanoid => HUMANOIDS_VERSION,
-    }
-}
+/// Increases whenever the same configuration and seeds give other rooms or other motion. Early builds wrote 1, 2 and 3.
+pub const SCENE_VERSION: u32 = 4;
 
 /// Digits of a scene's fingerprint: enough for any study.
 const FINGERPRINT_DIGITS: usize = 16;
@@ -96,6 +80,15 @@ pub struct HungPane {
     pub paint: Option<Color>,
     /// The body that is seen in it alone: in place of the own one, or behind the window.
     pub double: Option<Other>,
+    /// The first step that shows it; the first of all if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from_t: Option<u32>,
+    /// The last step that shows it; the last of all if absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until_t: Option<u32>,
+    /// True if it has a frame.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub frame: bool,
 }
 
 /// A mark on a body.
@@ -211,6 +204,24 @@ impl MirrorPlace {
         let [out_x, out_y] = self.heading().direction();
         spot[1] * out_x - spot[0] * out_y - self.offset
     }
+
+    /// The place of a body's image across the picture of an eye that faces the mirror; larger to the left. The image is as
+    /// far behind the mirror as the body is before it.
+    pub(crate) fn across(self, body: [f64; 2], eye: [f64; 2], config: &WorldConfig) -> f64 {
+        (self.aside(body) - self.aside(eye)) / (self.distance(body, config) + self.distance(eye, config))
+    }
+}
+
+impl HungPane {
+    /// Returns true if the wall has it at a step, counted from 1.
+    pub fn is_shown_at(&self, t: u32) -> bool {
+        self.from_t.is_none_or(|from| from <= t) && self.until_t.is_none_or(|until| t <= until)
+    }
+
+    /// The colour of the body in it, if it is not the own body in its own colour.
+    pub(super) fn shown_color(&self) -> Option<Color> {
+        self.paint.or_else(|| self.double.map(|double| double.color))
+    }
 }
 
 /// The distance from a body's axis to the middle of a patch, mm.
@@ -233,8 +244,12 @@ pub(super) fn in_room(body: Pose, [ahead, left, up]: [f64; 3]) -> [f64; 3] {
     [body.x + ahead * x - left * y, body.y + ahead * y + left * x, up]
 }
 
+/// The steps of a way along the axes.
+pub(super) fn manhattan(way: [i32; 3]) -> u32 {
+    way.iter().map(|steps| steps.unsigned_abs()).sum()
+}
+
 impl HandStart {
-    /// Half of its width, m.
     pub fn half(self) -> f64 {
         f64::from(self.half_mm) / 1000.0
     }
@@ -263,28 +278,27 @@ impl Scene {
         }
     }
 
-    /// The marks present at a step, counted from 1.
-    pub(crate) fn marks_at(&self, t: u32) -> impl Iterator<Item = (usize, &WornMark)> {
-        self.marks.iter().enumerate().filter(move |(_, mark)| mark.from_t <= t)
+    /// The panes and marks that a step shows, in the order of the scene.
+    pub(super) fn shown_at(&self, t: u32) -> Vec<bool> {
+        let panes = self.panes.iter().map(|pane| pane.is_shown_at(t));
+        panes.chain(self.marks.iter().map(|mark| mark.from_t <= t)).collect()
     }
 
-    /// The colour of the first mark on the own body at a step.
     pub fn own_mark_at(&self, t: u32) -> Option<Color> {
-        self.marks_at(t).find(|(_, mark)| mark.wearer == 0).map(|(_, mark)| mark.color)
+        self.marks.iter().find(|mark| mark.from_t <= t && mark.wearer == 0).map(|mark| mark.color)
     }
 
     /// The first colour other than the own body's in which a pane shows a body: a decoy's paint, or the colour of a
     /// body that only this pane shows. `None` without one.
     pub fn shown_color(&self) -> Option<Color> {
-        let shown = |pane: &HungPane| pane.paint.or_else(|| pane.double.map(|double| double.color));
-        self.panes.iter().filter_map(shown).find(|color| *color != self.body_color)
+        self.panes.iter().filter_map(HungPane::shown_color).find(|color| *color != self.body_color)
     }
 
     /// The shared features of paired episodes: the room, the body, the cubes, the start and the others. The compared
     /// features are not part of it: the mirror, and the statement.
     pub fn fingerprint(&self, config: &WorldConfig) -> String {
         let Self { body_color, start, cubes, others, .. } = self;
-        let mut parts = json!([ROOMS_VERSION, config.room, body_color, start, cubes, others]);
+        let mut parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
         if let (Some(hand), Some(parts)) = (self.hand, parts.as_array_mut()) {
             // The hand's position is relative to the mark to be reached.
             parts.extend([json!(hand), json!(self.marks)]);
@@ -296,9 +310,7 @@ impl Scene {
 
     /// The Manhattan distance from the hand to the mark at the start, mm; `None` without a hand.
     pub fn start_distance(&self) -> Option<i32> {
-        let (task, hand) = (self.experiment.hand?, self.hand?);
-        let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
-        i32::try_from(steps * task.step_mm).ok()
+        i32::try_from(manhattan(self.hand?.from_mark) * self.experiment.hand?.step_mm).ok()
     }
 
     /// Steps after which an episode ends automatically. With a hand: those of the way to the mark and some more,
@@ -306,14 +318,20 @@ impl Scene {
     pub fn budget(&self, config: &WorldConfig) -> u32 {
         match (self.experiment.hand, self.hand) {
             (Some(task), Some(hand)) => {
-                let way: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
-                (way + task.extra_steps).min(self.experiment.steps.unwrap_or(u32::MAX))
+                (manhattan(hand.from_mark) + task.extra_steps).min(self.experiment.steps.unwrap_or(u32::MAX))
             }
             _ => config.for_experiment(&self.experiment).episode.steps,
         }
     }
 
-    /// The cubes to select from.
+    /// The number of others to the left of the own body in the first mirror at the start; `None` without a mirror.
+    pub(crate) fn mirror_place(&self, config: &WorldConfig) -> Option<usize> {
+        let mirror = self.panes.first()?.place;
+        let across = |spot: [f64; 2]| mirror.across(spot, self.start.ahead(config.eye.forward).spot(), config);
+        let own = across(self.start.spot());
+        Some(self.others.iter().filter(|other| across(other.start.spot()) > own).count())
+    }
+
     pub(super) fn candidates(&self) -> &[Cube] {
         if self.experiment.has_candidates() { &self.cubes } else { &[] }
     }

@@ -6,47 +6,22 @@ use super::body::Piece;
 use super::model::{AGENTS, EYE_CAMERA, Item, Stage};
 use super::world::World;
 use mirrorstats_experiment::angle::Quaternion;
-use mirrorstats_log::write::Placed;
+use mirrorstats_log::write::{Form, Placed, Solid};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Snapshot {
     /// The moving bodies, each in the frame of the room and with a name of its own: `agent0_trunk`, .. and `eye`.
     pub frames: Vec<Placed>,
-    /// Every visible shape, in the frame of the room.
+    /// Every visible shape, with a unique name such as `pane0`, `cube0` or `agent0_head`.
     pub solids: Vec<Solid>,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct Solid {
-    /// Unique among the shapes, such as `pane0`, `cube0` or `agent0_head`.
-    pub name: String,
-    pub item: Item,
-    pub shape: Shape,
-    /// Of its centre, m.
-    pub position: [f64; 3],
-    /// A unit quaternion: w, x, y, z.
-    pub rotation: [f64; 4],
-    /// Red, green, blue and opacity, from 0 to 1.
-    pub rgba: [f32; 4],
-}
-
-/// A form and its sizes, m, about its centre.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// A rectangle with these full sides along x and y, its front to +z.
-    Plane([f64; 2]),
-    Sphere(f64),
-    /// About z: the radius, and the full length of the cylinder between its round ends.
-    Capsule {
-        radius: f64,
-        length: f64,
-    },
-    Box([f64; 3]),
+    /// What each of the shapes belongs to.
+    pub items: Vec<Item>,
 }
 
 impl World {
     pub fn snapshot(&self) -> Snapshot {
-        Snapshot { frames: frames(self), solids: solids(self.stage()) }
+        let (items, solids) = solids(self.stage()).unzip();
+        Snapshot { frames: frames(self), solids, items }
     }
 }
 
@@ -73,30 +48,31 @@ fn frames(world: &World) -> Vec<Placed> {
     pieces.chain([eye]).chain(doubles).collect()
 }
 
-fn solids(stage: &Stage) -> Vec<Solid> {
-    let model = stage.model();
-    (0..stage.items().len())
-        // Only shadows are translucent.
-        .filter(|geom| stage.is_shown(*geom) && model.geom_rgba()[*geom][3] >= 1.0)
-        .map(|geom| Solid {
+fn solids(stage: &Stage) -> impl Iterator<Item = (Item, Solid)> {
+    let model = &stage.model;
+    // Only shadows are translucent.
+    let shown = |geom: &usize| stage.is_shown(*geom) && model.geom_rgba()[*geom][3] >= 1.0;
+    (0..stage.items.len()).filter(shown).map(move |geom| {
+        let item = stage.items[geom];
+        let solid = Solid {
             name: model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned(),
-            item: stage.items()[geom],
-            shape: shape(stage.items()[geom], model.geom_type()[geom], model.geom_size()[geom]),
+            form: form(item, model.geom_type()[geom], model.geom_size()[geom]),
             position: stage.data.geom_xpos()[geom],
             rotation: quaternion(stage.data.geom_xmat()[geom]),
             rgba: model.geom_rgba()[geom],
-        })
-        .collect()
+        };
+        (item, solid)
+    })
 }
 
-fn shape(item: Item, kind: MjtGeomBase, size: [f64; 3]) -> Shape {
+fn form(item: Item, kind: MjtGeomBase, size: [f64; 3]) -> Form {
     match kind {
         // Only the face of a pane is shown.
-        _ if matches!(item, Item::Pane(_)) => Shape::Plane([2.0 * size[0], 2.0 * size[1]]),
-        MjtGeomBase::mjGEOM_PLANE => Shape::Plane([2.0 * size[0], 2.0 * size[1]]),
-        MjtGeomBase::mjGEOM_SPHERE => Shape::Sphere(size[0]),
-        MjtGeomBase::mjGEOM_CAPSULE => Shape::Capsule { radius: size[0], length: 2.0 * size[1] },
-        _ => Shape::Box(size.map(|half| 2.0 * half)),
+        _ if matches!(item, Item::Pane(_)) => Form::Plane([2.0 * size[0], 2.0 * size[1]]),
+        MjtGeomBase::mjGEOM_PLANE => Form::Plane([2.0 * size[0], 2.0 * size[1]]),
+        MjtGeomBase::mjGEOM_SPHERE => Form::Sphere(size[0]),
+        MjtGeomBase::mjGEOM_CAPSULE => Form::Capsule { radius: size[0], length: 2.0 * size[1] },
+        _ => Form::Box(size.map(|half| 2.0 * half)),
     }
 }
 

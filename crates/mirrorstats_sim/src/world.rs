@@ -16,7 +16,7 @@ use super::model::{AGENTS, BODIES, ModelError, PaintMode, SceneMoment, Sight, St
 use super::scene::Scene;
 use mirrorstats_experiment::spec::{Behavior, PaneKind};
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Moved {
@@ -33,9 +33,10 @@ pub struct World {
     doubles: Vec<Option<Distractor>>,
     /// The next step, from 1.
     t: u32,
-    past: VecDeque<Vec<Figure>>,
-    /// The hand's steps from the mark, the latest last, parallel to `past`; empty without a hand.
-    hand: VecDeque<[i32; 3]>,
+    /// The hand's steps from the mark; `None` without a hand.
+    hand: Option<[i32; 3]>,
+    /// All bodies and the hand, the latest last, as far back as a pane shows them.
+    past: VecDeque<(Vec<Figure>, Option<[i32; 3]>)>,
     stage: Stage,
     beyond: Vec<Stage>,
     /// The label of every pixel of the eye's view, cached until something moves, for counts and pictures.
@@ -54,7 +55,7 @@ impl World {
             doubles: scene.panes.iter().map(|pane| pane.double.as_ref().map(Distractor::new)).collect(),
             t: 1,
             past: VecDeque::new(),
-            hand: scene.hand.iter().map(|hand| hand.from_mark).collect(),
+            hand: scene.hand.map(|hand| hand.from_mark),
             labels: OnceCell::new(),
             config,
             scene,
@@ -88,16 +89,13 @@ impl World {
 
     /// All bodies as a pane shows them, with its delay. Before enough steps have passed, their state at the start.
     pub fn figures_in(&self, pane: usize) -> Vec<Figure> {
-        let back = self.scene.panes[pane].delay as usize;
-        let at = self.past.len().saturating_sub(1 + back);
-        self.past.get(at).cloned().unwrap_or_default()
+        self.before(self.scene.panes[pane].delay).0
     }
 
     pub fn double(&self, pane: usize) -> Option<Figure> {
         self.doubles[pane].as_ref().map(|double| double.figure)
     }
 
-    /// Returns true if the own body wears a mark at any step.
     pub fn has_own_mark(&self) -> bool {
         self.scene.marks.iter().any(|mark| mark.wearer == 0)
     }
@@ -115,37 +113,34 @@ impl World {
         &self.beyond
     }
 
-    pub fn eye_beyond(&self, pane: usize) -> Pose {
-        mirror_eye::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
-    }
-
     /// The Manhattan distance from the hand to the mark, mm; `None` without a hand.
     pub fn target_distance(&self) -> Option<i32> {
         let place = HandRules::for_scene(&self.scene, &self.config)?;
-        i32::try_from(place.distance_mm(*self.hand.back()?)).ok()
+        i32::try_from(place.distance_mm(self.hand?)).ok()
     }
 
     pub fn is_reached(&self) -> bool {
         HandRules::for_scene(&self.scene, &self.config)
-            .zip(self.hand.back())
-            .is_some_and(|(place, from_mark)| place.is_reached(*from_mark))
+            .zip(self.hand)
+            .is_some_and(|(place, from_mark)| place.is_reached(from_mark))
     }
 
-    /// The position of the hand, m; `None` without one.
+    /// The middle of the hand, m; `None` without one.
     pub fn hand(&self) -> Option<[f64; 3]> {
-        self.hand_back(0)
+        Some(HandRules::for_scene(&self.scene, &self.config)?.center(self.hand?))
     }
 
-    fn hand_back(&self, steps: u32) -> Option<[f64; 3]> {
-        let at = self.hand.len().saturating_sub(1 + steps as usize);
-        Some(HandRules::for_scene(&self.scene, &self.config)?.center(*self.hand.get(at)?))
+    /// All bodies and the hand as they were some steps ago, or at the start.
+    fn before(&self, steps: u32) -> (Vec<Figure>, Option<[i32; 3]>) {
+        let at = self.past.len().saturating_sub(1 + steps as usize);
+        self.past.get(at).cloned().unwrap_or_default()
     }
 
     fn reach(&mut self, step: [i32; 3]) -> Moved {
-        let Some(from) = self.hand.back().copied() else { return Moved::default() };
+        let Some(from) = self.hand else { return Moved::default() };
         let to = [0, 1, 2].map(|axis| from[axis].saturating_add(step[axis]));
         let is_free = HandRules::for_scene(&self.scene, &self.config).is_some_and(|place| place.is_free(to));
-        self.hand.push_back(if is_free { to } else { from });
+        self.hand = Some(if is_free { to } else { from });
         Moved { bumped: !is_free }
     }
 
@@ -228,13 +223,10 @@ impl World {
 
     fn settle(&mut self) {
         self.labels.take();
-        self.past.push_back(self.figures());
+        self.past.push_back((self.figures(), self.hand));
         let latest = self.scene.panes.iter().map(|pane| pane.delay as usize).max().unwrap_or_default();
         while self.past.len() > latest + 1 {
             self.past.pop_front();
-        }
-        while self.hand.len() > latest + 1 {
-            self.hand.pop_front();
         }
         let direct = self.moment(Sight::Direct);
         self.stage.show(&self.config, &self.scene, &direct);
@@ -244,35 +236,25 @@ impl World {
         }
     }
 
-    /// Further stages of the same scene in its current state: with other paint, or for other rays.
-    pub fn stages(&self, paint: PaintMode) -> Result<(Stage, Vec<Stage>), ModelError> {
-        let mut stages = Stage::all(&self.config, paint, &self.scene)?;
-        self.show_on(&mut stages);
-        Ok(stages)
-    }
-
-    /// Updates stages of the same scene to the state of this world.
-    pub(crate) fn show_on(&self, (stage, beyond): &mut (Stage, Vec<Stage>)) {
+    pub fn show_on(&self, (stage, beyond): &mut (Stage, Vec<Stage>)) {
         for stage in std::iter::once(stage).chain(beyond) {
-            let moment = self.moment(stage.look());
+            let moment = self.moment(stage.look);
             stage.show(&self.config, &self.scene, &moment);
         }
     }
 
     fn moment(&self, look: Sight) -> SceneMoment {
-        let (figures, t, beyond, late) = match look {
-            Sight::Direct => (self.figures(), self.t, None, 0),
-            Sight::Through(pane) => {
-                let late = self.scene.panes[pane].delay;
-                (self.figures_in(pane), self.t.saturating_sub(late).max(1), Some(self.eye_beyond(pane)), late)
-            }
-        };
+        let late = look.pane(&self.scene).map_or(0, |(_, pane)| pane.delay);
+        let (figures, from_mark) = self.before(late);
         let mut bodies = [None; BODIES];
         bodies.iter_mut().zip(figures).for_each(|(place, figure)| *place = Some(figure));
-        if let Sight::Through(pane) = look {
+        let beyond = look.pane(&self.scene).map(|(pane, hung)| {
             bodies[AGENTS + pane] = self.double(pane);
-        }
-        SceneMoment { t, bodies, beyond, hand: self.hand_back(late) }
+            mirror_eye::eye(&self.config, hung, self.ego.pose)
+        });
+        let rules = HandRules::for_scene(&self.scene, &self.config);
+        let hand = rules.zip(from_mark).map(|(rules, from_mark)| rules.center(from_mark));
+        SceneMoment { t: self.t.saturating_sub(late).max(1), bodies, beyond, hand }
     }
 
     /// The distance that the agent's body could still walk before it touches the candidate of a colour, m; `None` if

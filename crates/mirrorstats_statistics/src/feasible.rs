@@ -16,7 +16,6 @@ use mirrorstats_exact::rounding::Rounding;
 pub struct Sample {
     /// The number of values; at least one.
     pub n: u64,
-    /// True if each value is 0 or 1.
     pub is_rate: bool,
     pub form: StandardError,
 }

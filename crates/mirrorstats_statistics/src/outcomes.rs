@@ -6,14 +6,9 @@
 
 use std::iter::successors;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// The tolerance for equal weights.
 pub(super) const TIE: f64 = 1e-12;
 
-/// The p values of one exact two-sided test.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExactTest {
     /// The exact p value: under the hypothesis it is at most any level with at most that probability.
     /// One below the smallest normal floating-point number is 0.
@@ -99,7 +94,6 @@ pub(super) fn convolved(a: &[f64], b: &[f64]) -> Vec<f64> {
     sums
 }
 
-/// A count of episodes as an index.
 pub(super) fn size(count: u64) -> usize {
     usize::try_from(count).expect("counts of episodes are far below the address space")
 }

@@ -9,9 +9,6 @@
 //! needs an order, but the result does not, so no order of seeds and runs is chosen. The assumption is that each
 //! episode succeeds with the same probability, whatever came before.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use super::chance::Odds;
 use super::comparisons::holm;
 use super::comparisons::paired::Pairs;
@@ -20,7 +17,7 @@ use super::intervals::quantile;
 use mirrorstats_exact::ratio::Ratio;
 
 /// The evidence against a hypothesis, at any time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EValue {
     /// The e-value: what a bet of 1 against the hypothesis has become; the largest number where it is larger.
     pub e: f64,

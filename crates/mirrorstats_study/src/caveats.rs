@@ -3,6 +3,7 @@
 use mirrorstats_analysis::plan::departures::{Looks, departures};
 use mirrorstats_analysis::statistics::{Options, Selection};
 use mirrorstats_metric::names::is_about;
+use mirrorstats_score::cells::group::GroupError;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::vocabulary;
@@ -11,7 +12,7 @@ use mirrorstats_trace::beside::labels;
 use mirrorstats_trace::footers::declared::{self, Declared, Origin};
 
 use crate::losses::LostAs;
-use crate::{Study, StudyError, pooled};
+use crate::{Study, pooled};
 
 /// The filter. It depends on results if it uses more than the values recorded before an episode begins.
 pub(crate) fn selection(study: &Study, episodes: &EpisodeTable) -> Option<Selection> {
@@ -28,8 +29,7 @@ pub(crate) fn departed(study: &Study, episodes: &EpisodeTable, options: &Options
     Some(departures(study.plan.as_ref()?, episodes, options, looks))
 }
 
-/// The mixtures in cells that are pooled on request.
-pub(crate) fn pooled_cells(study: &Study, episodes: &EpisodeTable) -> Result<Option<Vec<String>>, StudyError> {
+pub(crate) fn pooled_cells(study: &Study, episodes: &EpisodeTable) -> Result<Option<Vec<String>>, GroupError> {
     study.question.pool.then(|| pooled::mixtures(episodes, &study.question.by_over(episodes))).transpose()
 }
 

@@ -9,10 +9,11 @@ use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use crate::error::kinds;
 use crate::inputs::{ScoreFile, Source, Stamp};
-use crate::losses::LostAs;
+use crate::own_definitions::{NotScored, unscored};
 use crate::question::Question;
-use crate::{Study, StudyError, own_definitions, scores};
+use crate::{Study, StudyError, scores};
 use mirrorstats_analysis::changes::{Changes, Flip, Overlap};
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_report::layout::TableOrder;
@@ -25,6 +26,22 @@ use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::{flips, vocabulary};
 use mirrorstats_trace::inputs::{self, Input};
 use mirrorstats_trace::read::open::TraceSet;
+
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum DiffError {
+    #[error(
+        "`{name}` are definitions: expected traces to score with them, found none\n  \
+         help: name the traces after OLD and NEW"
+    )]
+    NoTraces { name: String },
+    #[error(
+        "{argument}: expected definitions, scores or a report's folder, found no scores in it\n  \
+         help: OLD and NEW come first, the traces after them"
+    )]
+    NoSide { argument: String },
+}
+
+kinds! { Input: DiffError; }
 
 /// One side of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -155,7 +172,7 @@ impl Side {
         match ScoreFile::all(&inputs)? {
             Some(scores) => Ok(Self::Scores(scores)),
             None if path.is_dir() || (path.extension() == Some(OsStr::new("parquet")) && path.exists()) => {
-                Err(StudyError::NoSide { argument: path.display().to_string() })
+                Err(DiffError::NoSide { argument: path.display().to_string() }.into())
             }
             None => Ok(Self::Definitions(path.to_owned())),
         }
@@ -170,10 +187,8 @@ impl Side {
         Question {
             definitions,
             filter: request.filter.clone(),
-            metrics: None,
             by: Some(request.by.clone()),
             pool: true,
-            lost: LostAs::Nothing,
             ..Question::default()
         }
     }
@@ -186,6 +201,7 @@ impl Side {
         Study::of(inputs)?.threads(request.threads).asked(self.question(request))
     }
 
+    /// The names of its metrics; and the scores, unless definitions compute them.
     fn read(
         &self,
         traces: Option<&TraceSet>,
@@ -204,32 +220,18 @@ impl Side {
         }
     }
 
-    /// The scores with these metrics, or what computes them.
-    fn half<'t>(
+    /// The definitions with these metrics, and the traces that they score; `None` for scores.
+    fn bound<'t>(
         &self,
-        table: Option<EpisodeTable>,
-        common: &[String],
+        metrics: &[String],
         traces: Option<&'t TraceSet>,
         request: &DiffRequest,
-    ) -> Result<Half<'t>, StudyError> {
-        match (self, table, traces) {
-            (_, Some(mut table), _) => {
-                table.metrics.retain(|metric| common.contains(&metric.name));
-                Ok(Half::Scores(Box::new(table)))
-            }
-            (_, None, Some(traces)) => {
-                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
-                Ok(Half::Definitions(Box::new(question.bind(traces)?), traces))
-            }
-            (Self::Definitions(name), None, None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
-            (Self::Scores(_), None, None) => Err(StudyError::NoScores),
-        }
+    ) -> Result<Option<(Definitions, &'t TraceSet)>, StudyError> {
+        let Self::Definitions(name) = self else { return Ok(None) };
+        let traces = traces.ok_or_else(|| DiffError::NoTraces { name: name.display().to_string() })?;
+        let question = Question { metrics: Some(metrics.to_vec()), ..self.question(request) };
+        Ok(Some((question.bind(traces)?, traces)))
     }
-}
-
-enum Half<'t> {
-    Scores(Box<EpisodeTable>),
-    Definitions(Box<Definitions>, &'t TraceSet),
 }
 
 impl Pair {
@@ -241,28 +243,29 @@ impl Pair {
         let [before, after] =
             [old_metrics, new_metrics].map(|names| names.into_iter().filter(wanted).collect::<Vec<String>>());
         let common: Vec<String> = after.iter().filter(|name| before.contains(name)).cloned().collect();
-        let halves = [old.half(old_table, &common, traces, request)?, new.half(new_table, &common, traces, request)?];
+        let (old, new) = (old.bound(&common, traces, request)?, new.bound(&common, traces, request)?);
         let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
-        let score = |half| match half {
-            Half::Scores(table) => Ok((*table, None)),
-            Half::Definitions(definitions, traces) => {
-                let table = score_traces::score(traces, &definitions, &labels, request.threads)?;
-                Ok::<_, StudyError>((table, Some(*definitions)))
+        let scored = |bound: &Option<(Definitions, &TraceSet)>, scores: Option<EpisodeTable>| {
+            if let Some((definitions, traces)) = bound {
+                return score_traces::score(traces, definitions, &labels, request.threads);
             }
+            let mut table = scores.expect("a side without definitions has scores");
+            table.metrics.retain(|metric| common.contains(&metric.name));
+            Ok(table)
         };
-        let ([(old, old_definitions), (new, new_definitions)], evidence) = match halves {
+        let ([old_table, new_table], evidence) = match (&old, &new) {
             // One scan scores both.
-            [Half::Definitions(old, traces), Half::Definitions(new, _)] => {
-                let flips::ScoredPair { tables: [before, after], evidence } =
-                    flips::score_pair(traces, [&old, &new], &labels, request.threads)?;
-                ([(before, Some(*old)), (after, Some(*new))], Some(evidence))
+            (Some((old, traces)), Some((new, _))) => {
+                let pair = flips::score_pair(traces, [old, new], &labels, request.threads)?;
+                (pair.tables, Some(pair.evidence))
             }
-            [old, new] => ([score(old)?, score(new)?], None),
+            _ => ([scored(&old, old_table)?, scored(&new, new_table)?], None),
         };
+        let [old, new] = [old, new].map(|bound| bound.map(|(definitions, _)| definitions));
         Ok(Self {
             evidence,
-            before: Scored { table: old, metrics: before, definitions: old_definitions },
-            after: Scored { table: new, metrics: after, definitions: new_definitions },
+            before: Scored { table: old_table, metrics: before, definitions: old },
+            after: Scored { table: new_table, metrics: after, definitions: new },
         })
     }
 
@@ -281,8 +284,7 @@ impl Pair {
         threads: NonZeroUsize,
     ) -> Result<Vec<String>, StudyError> {
         if let Some([before, after]) = &self.evidence {
-            changes.explain_before(before);
-            changes.explain_after(after);
+            changes.explain(before, after);
             return Ok(Vec::new());
         }
         let wanted = changes.flipped_episodes();
@@ -300,8 +302,7 @@ impl Pair {
             Err(error) => Err(StudyError::from(error)),
         };
         let (before, after) = (evidence(&self.before, "before")?, evidence(&self.after, "after")?);
-        changes.explain_before(&before);
-        changes.explain_after(&after);
+        changes.explain(&before, &after);
         if notes.is_empty() {
             notes.extend(unexplained(changes));
         }
@@ -317,12 +318,10 @@ impl Scored {
 
     fn unscored(&self, traces: &TraceSet) -> Option<String> {
         let is_kept = |name: &str| self.table.keys.iter().any(|key| key.experiment == name);
-        match own_definitions::unscored(self.definitions.as_ref()?, traces, is_kept)? {
-            StudyError::NotScored { experiment, definitions, own } => Some(format!(
-                "`{definitions}` does not score the experiment `{experiment}`, as `{own}` does: its zeros there mean nothing"
-            )),
-            _ => None,
-        }
+        let NotScored { experiment, definitions, own } = unscored(self.definitions.as_ref()?, traces, is_kept)?;
+        Some(format!(
+            "`{definitions}` does not score the experiment `{experiment}`, as `{own}` does: its zeros there mean nothing"
+        ))
     }
 
     fn definitions(&self, traces: &TraceSet, metrics: &[String]) -> Result<Definitions, ScoreError> {
@@ -341,7 +340,7 @@ fn check_known(asked: Option<&[String]>, old: &[String], new: &[String]) -> Resu
     let known = || new.iter().chain(old.iter().filter(|name| !new.contains(name)));
     match asked.unwrap_or_default().iter().find(|name| !known().any(|known| known == *name)) {
         None => Ok(()),
-        Some(name) => Err(UnknownMetric::new(name, known().cloned().collect())),
+        Some(name) => Err(UnknownMetric::new(name, &known().cloned().collect::<Vec<_>>())),
     }
 }
 

@@ -5,10 +5,12 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::num::NonZeroUsize;
 
+use crate::error::kinds;
 use crate::inputs::Source;
 use crate::question::Question;
-use crate::{Study, StudyError, scores};
+use crate::{StudyError, scores};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_metric::names::mentioned;
@@ -19,46 +21,52 @@ use mirrorstats_score::{score_traces, vocabulary};
 
 const LISTED: usize = 8;
 
-impl Study {
-    /// Returns an error if the filter keeps no episode.
-    pub(crate) fn check_filter(&self, episodes: usize) -> Result<(), StudyError> {
-        match self.empty_filter(episodes)? {
-            None => Ok(()),
-            Some(words) => Err(StudyError::EmptyFilter { words }),
+#[derive(Debug, thiserror::Error)]
+#[error("{words}\n  help: give a filter that holds for some of them, or none")]
+pub(crate) struct EmptyFilter {
+    pub words: String,
+}
+
+kinds! { Argument: EmptyFilter; }
+
+/// The explanation of a filter that keeps no episode; `None` without a filter.
+pub(crate) fn explained(
+    source: &Source,
+    question: &Question,
+    threads: NonZeroUsize,
+) -> Result<Option<String>, StudyError> {
+    let Some(filter) = question.filter.as_deref() else { return Ok(None) };
+    let names = mentioned(filter);
+    let all = unfiltered(source, question, &names, threads)?;
+    let episodes = counted(all.len() as u64, "episode");
+    let mut words = format!("the filter `{}` keeps none of {episodes}", visible(filter));
+    for name in &names {
+        if let Some(values) = column_values(&all, name) {
+            let _ = write!(words, "\n  {}: {}", visible(name), listed(&values));
         }
     }
+    Ok(Some(words))
+}
 
-    /// The explanation of a filter that keeps no episode; `None` if there are episodes or there is no filter. Errors:
-    /// faults of the inputs without the filter.
-    pub fn empty_filter(&self, episodes: usize) -> Result<Option<String>, StudyError> {
-        let Some(filter) = self.question.filter.as_deref().filter(|_| episodes == 0) else { return Ok(None) };
-        let names = mentioned(filter);
-        let all = self.unfiltered(&names)?;
-        let episodes = counted(all.len() as u64, "episode");
-        let mut words = format!("the filter `{}` keeps none of {episodes}", visible(filter));
-        for name in &names {
-            if let Some(values) = column_values(&all, name) {
-                let _ = write!(words, "\n  {}: {}", visible(name), listed(&values));
-            }
-        }
-        Ok(Some(words))
-    }
-
-    fn unfiltered(&self, names: &[String]) -> Result<EpisodeTable, StudyError> {
-        let Question { definitions, each, parts, .. } = self.question.clone();
-        let whole = Question { definitions, each, parts, ..Question::default() };
-        let traces = match &self.source {
-            Source::Scores(files) => return scores::read(files, &whole),
-            Source::Traces(traces) => traces,
-        };
-        let is_label =
-            |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && vocabulary::check_label(traces, name).is_ok();
-        let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
-        let known = whole.load(&vocabulary::trace_columns(traces))?.catalog.metric;
-        let metrics = names.iter().filter(|name| known.contains_key(*name)).cloned().collect();
-        let question = Question { metrics: Some(metrics), ..whole };
-        Ok(score_traces::score(traces, &question.bind(traces)?, &labels, self.threads)?)
-    }
+fn unfiltered(
+    source: &Source,
+    question: &Question,
+    names: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, StudyError> {
+    let Question { definitions, each, parts, .. } = question.clone();
+    let whole = Question { definitions, each, parts, ..Question::default() };
+    let traces = match source {
+        Source::Scores(files) => return scores::read(files, &whole),
+        Source::Traces(traces) => traces,
+    };
+    let is_label =
+        |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && vocabulary::check_label(traces, name).is_ok();
+    let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
+    let known = whole.load(&vocabulary::trace_columns(traces))?.catalog.metric;
+    let metrics = names.iter().filter(|name| known.contains_key(*name)).cloned().collect();
+    let question = Question { metrics: Some(metrics), ..whole };
+    Ok(score_traces::score(traces, &question.bind(traces)?, &labels, threads)?)
 }
 
 fn listed(values: &BTreeSet<KeyValue>) -> String {

@@ -61,7 +61,7 @@ fn differences(declared: &DeclaredExperiment, known: &Experiment) -> Vec<(String
     }
     let chance = declared.chance.iter().filter_map(|(metric, level)| {
         let own = known.chance.get(metric).filter(|own| *own != level)?;
-        Some((format!("chance level of {}", visible(metric)), spelled(*own), spelled(*level)))
+        Some((format!("chance level of {}", visible(metric)), spelled(own.as_ref()), spelled(level.as_ref())))
     });
     let reference = declared.reference.iter().filter_map(|(metric, levels)| {
         let own = known.reference.get(metric).filter(|own| *own != levels)?;
@@ -74,6 +74,8 @@ fn differences(declared: &DeclaredExperiment, known: &Experiment) -> Vec<(String
 #[cfg(test)]
 mod tests {
     use super::{DeclaredExperiment, differences};
+    use mirrorstats_exact::chance::Chance;
+    use mirrorstats_exact::ratio::Ratio;
     use mirrorstats_metric::definitions::Definitions;
     use mirrorstats_score::vocabulary::schema_columns;
 
@@ -97,7 +99,7 @@ mod tests {
         assert!(differences(&DeclaredExperiment { title: None, order: None, ..declared.clone() }, known).is_empty());
         declared.title = Some("Other".to_owned());
         declared.order = Some(6);
-        declared.chance.insert("TSA".to_owned(), "1/4".parse().ok());
+        declared.chance.insert("TSA".to_owned(), "1/4".parse::<Ratio>().ok().map(Chance::Of));
         declared.reference.insert("TSA".to_owned(), vec!["1/10".parse().unwrap()]);
         let found = differences(&declared, known);
         let told: Vec<_> = found.iter().map(|(what, own, other)| [what, own, other].map(String::as_str)).collect();

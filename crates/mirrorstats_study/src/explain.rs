@@ -20,7 +20,7 @@ pub fn explain(study: &Study, episode_id: &str) -> Result<Evidence, StudyError> 
     if own_definitions::unscored(&definitions, traces, |_| true).is_some() {
         let filter = Some(format!("episode_id = '{}'", episode_id.replace('\'', "''")));
         let one = Question { filter, ..study.question.clone() }.bind(traces)?;
-        own_definitions::check(&one, traces, &score_traces::score(traces, &one, &[], study.threads)?)?;
+        own_definitions::check_scored(&one, traces, &score_traces::score(traces, &one, &[], study.threads)?)?;
     }
     let found = evidence::explain(traces, &definitions, episode_id, study.threads);
     study.check_unchanged()?;

@@ -11,10 +11,9 @@ use crate::{Study, StudyError};
 use mirrorstats_figures::{Figure, FigureError, FigureName, FigureWidth, Input};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle::OutputFile;
-use mirrorstats_report::html;
 use mirrorstats_report::style::Style;
 use mirrorstats_score::cells::Cells;
-use mirrorstats_score::cells::group::{DEFAULT_BY, group};
+use mirrorstats_score::cells::group::{DEFAULT_BY, GroupError, group};
 use mirrorstats_trace::read::in_order::in_order;
 
 /// The options of a figure.
@@ -44,7 +43,7 @@ pub fn figure(study: &Study, name: FigureName, options: &FigureOptions) -> Resul
         name.check_count(metrics.len())?;
         style.sheet.figure.entry(name.name().to_owned()).or_default().metrics = Some(metrics.clone());
     }
-    let grouped = study.grouped_with(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
+    let grouped = study.grouped_with(Outputs::of_figures(&[name]))?;
     let mut results = grouped.counted.results;
     for metric in options.metrics.iter().flatten() {
         check_metric(&results.episodes, metric)?;
@@ -53,14 +52,15 @@ pub fn figure(study: &Study, name: FigureName, options: &FigureOptions) -> Resul
         let metric = options.metrics.iter().flatten().next().cloned();
         results = results.top_models(top, &metric.map_or_else(|| leading_metric(study), Ok)?);
     }
-    Ok(FigureInputs { options: options.clone(), ..FigureInputs::of(&results, &style)? }.draw(name)?)
+    let results = results.with_conditions_as_models();
+    Ok(FigureInputs { width: options.width, ..FigureInputs::of(results, &style)? }.draw(name)?)
 }
 
 #[derive(Debug)]
 pub(crate) struct FigureInputs<'a> {
     cells: Cells,
     style: &'a Style,
-    options: FigureOptions,
+    width: Option<FigureWidth>,
     results: Cow<'a, Results>,
     remark: Option<String>,
 }
@@ -77,23 +77,21 @@ pub(crate) struct Drawings {
 }
 
 impl<'a> FigureInputs<'a> {
-    /// Groups the episodes for figures: by experiment and model, with another condition as a model of its own.
-    fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
-        let results = results.with_conditions_as_models();
+    /// Groups the episodes for figures: by experiment and model.
+    fn of(results: Cow<'a, Results>, style: &'a Style) -> Result<Self, GroupError> {
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(Self { cells, style, options: FigureOptions::default(), results, remark: None })
+        Ok(Self { cells, style, width: None, results, remark: None })
     }
 
     /// The same for a page or a folder of all figures: of many models only the best, as the captions say.
-    pub(crate) fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
-        let all = Self::of(results, style)?;
+    pub(crate) fn of_a_report(results: &'a Results, style: &'a Style) -> Result<Self, GroupError> {
+        let all = results.with_conditions_as_models();
         let metric = results.episodes.catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);
-        let models: BTreeSet<&str> = all.results.episodes.keys.iter().map(|key| key.model).collect();
-        let Some((metric, _)) = metric.filter(|_| models.len() > MANY_MODELS) else { return Ok(all) };
-        let remark = format!("The best {SHOWN_OF_MANY} of {} models by {metric}.", models.len());
-        let results: Cow<'_, Results> = Cow::Owned(all.results.into_owned().top_models(SHOWN_OF_MANY, metric));
-        let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(Self { cells, style, options: FigureOptions::default(), results, remark: Some(remark) })
+        let models = all.episodes.keys.iter().map(|key| key.model).collect::<BTreeSet<_>>().len();
+        let Some((metric, _)) = metric.filter(|_| models > MANY_MODELS) else { return Self::of(all, style) };
+        let best = all.into_owned().top_models(SHOWN_OF_MANY, metric);
+        let remark = Some(format!("The best {SHOWN_OF_MANY} of {models} models by {metric}."));
+        Ok(Self { remark, ..Self::of(Cow::Owned(best), style)? })
     }
 
     fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
@@ -121,26 +119,12 @@ impl<'a> FigureInputs<'a> {
             episodes: Some(&self.results.episodes),
             outcomes: self.results.outcomes.as_ref(),
             timelines: self.results.timelines.as_deref(),
-            width: self.options.width,
+            width: self.width,
         }
     }
 }
 
 impl Drawings {
-    pub(crate) fn svgs(&self) -> Vec<String> {
-        self.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect()
-    }
-
-    pub(crate) fn on_page<'a>(&'a self, svgs: &'a [String]) -> Vec<html::EmbeddedFigure<'a>> {
-        let figure = |((name, drawn), svg): (&'a (FigureName, Figure), &'a String)| html::EmbeddedFigure {
-            name: name.name(),
-            title: drawn.title(),
-            caption: drawn.caption(),
-            svg,
-        };
-        self.drawn.iter().zip(svgs).map(figure).collect()
-    }
-
     /// The files of the figures. PNG takes most of the time of a report that has it.
     pub(crate) fn files(&self, threads: NonZeroUsize, png: bool) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();

@@ -6,8 +6,7 @@ use std::path::Path;
 
 use crate::StudyError;
 use crate::experiment_findings::experiment_findings;
-use crate::own_definitions::{Carried, carried};
-use crate::question::DEFAULT_DEFINITIONS;
+use crate::own_definitions::{Carried, DEFAULT_DEFINITIONS, carried};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_metric::definitions::Definitions;

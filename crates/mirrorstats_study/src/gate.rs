@@ -5,12 +5,14 @@ use std::path::Path;
 use std::slice;
 
 use crate::caveats::{design_of, selection};
-use crate::copies::copies;
+use crate::copies::{copies, suspected};
+use crate::error::kinds;
 use crate::inputs::Source;
+use crate::limits::check_verdicts;
 use crate::results::{Outputs, Results};
-use crate::statistics::check_verdicts;
 use crate::{Study, StudyError, pooled};
 use mirrorstats_analysis::gate::{FlippedPair, Gate, GateOptions, Played};
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::{Better, Metric};
 use mirrorstats_metric::definitions::UnknownMetric;
 use mirrorstats_score::evidence;
@@ -18,7 +20,16 @@ use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::inputs::{self, Input};
 use mirrorstats_trace::read::open::TraceSet;
 
-/// The side of a flip.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{metric}: expected a metric with `better = \"higher\"` or \"lower\", found none\n  help: name another metric with --metric"
+)]
+pub(crate) struct NoDirection {
+    metric: String,
+}
+
+kinds! { Argument: NoDirection; }
+
 type OfSide = fn(&mut FlippedPair) -> &mut Played;
 
 /// Compares a later study with an earlier one. Each cell has a verdict, or the reason for none. Errors: as
@@ -35,7 +46,9 @@ pub fn gate(base: &Study, new: &Study, options: &GateOptions) -> Result<Gate, St
         gate.caveats.extend(pooled::mixtures(table, &study.question.by_over(table))?);
     }
     for ((side, study, _), results) in sides.into_iter().zip(&results) {
-        gate.caveats.extend(copies(study, results)?.map(|copies| format!("{side}: {}", copies.sentence)));
+        let copies = copies(study, results)?.map(|copies| copies.sentence);
+        let copies = copies.into_iter().chain(suspected(study, results)?.map(|phrase| format!("{phrase}.")));
+        gate.caveats.extend(copies.map(|sentence| format!("{side}: {sentence}")));
     }
     let of_side: [OfSide; 2] = [|flip| &mut flip.base, |flip| &mut flip.new];
     let mut caveats = Vec::new();
@@ -66,16 +79,16 @@ pub fn leading_metric(study: &Study) -> Result<String, StudyError> {
     };
     let found = catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);
     let first = || catalog.metric.keys().next().cloned().unwrap_or_default();
-    found.map(|(name, _)| name.clone()).ok_or_else(|| StudyError::NoDirection { metric: first() })
+    found.map(|(name, _)| name.clone()).ok_or_else(|| NoDirection { metric: first() }.into())
 }
 
 fn gated(study: &Study, options: &GateOptions) -> Result<Results, StudyError> {
-    let results = study.scan(Outputs { losses: true, copy_candidates: true, ..Outputs::default() })?;
+    let results = study.scan(Outputs { copy_candidates: true, design: true, ..Outputs::default() })?;
     let table = &results.episodes;
     study.check_filter(table.len())?;
     check_verdicts(table)?;
     if check_metric(table, &options.metric)?.better == Better::Neither {
-        return Err(StudyError::NoDirection { metric: options.metric.clone() });
+        return Err(NoDirection { metric: options.metric.clone() }.into());
     }
     if !options.pool {
         pooled::check(table, &study.question.by_over(table))?;
@@ -84,7 +97,7 @@ fn gated(study: &Study, options: &GateOptions) -> Result<Results, StudyError> {
 }
 
 /// The value of each episode, and the timesteps that decided it.
-type DecidingSteps = BTreeMap<String, (Option<i64>, Vec<i64>)>;
+type DecidingSteps = BTreeMap<String, (Option<Decimal>, Vec<i64>)>;
 
 fn deciding_steps(study: &Study, ids: &BTreeSet<String>, metric: &str) -> Result<DecidingSteps, StudyError> {
     match &study.source {
@@ -122,9 +135,8 @@ fn deciding_steps_in(
     Ok(first.map(|(id, found)| (id, (found.value, found.timesteps))).collect())
 }
 
-pub(crate) fn check_metric<'t>(table: &'t EpisodeTable, name: &str) -> Result<&'t Metric, StudyError> {
+pub(crate) fn check_metric<'t>(table: &'t EpisodeTable, name: &str) -> Result<&'t Metric, UnknownMetric> {
     let found = table.catalog.metric.get(name).filter(|_| table.metric(name).is_some());
-    found.ok_or_else(|| {
-        UnknownMetric::new(name, table.metrics.iter().map(|column| column.name.clone()).collect()).into()
-    })
+    let known = || table.metrics.iter().map(|column| column.name.clone()).collect::<Vec<_>>();
+    found.ok_or_else(|| UnknownMetric::new(name, &known()))
 }

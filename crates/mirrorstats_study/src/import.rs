@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::StudyError;
+use crate::error::kinds;
 use crate::findings::ExpectedTraces;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
@@ -21,6 +22,15 @@ use mirrorstats_trace::schema::colors::palette::Palette;
 
 /// A colour takes only a few bytes.
 const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
+
+#[derive(Debug, thiserror::Error)]
+#[error("--palette {typed}: {words}")]
+pub(crate) struct PaletteError {
+    typed: String,
+    words: String,
+}
+
+kinds! { Argument: PaletteError; }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
@@ -84,12 +94,12 @@ pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAns
 }
 
 /// The palette in an argument or in the file that it names. A text with a comma is never a file name.
-fn palette(path: &Path) -> Result<Palette, StudyError> {
+fn palette(path: &Path) -> Result<Palette, PaletteError> {
     let typed = path.to_string_lossy();
     if typed == "default" {
         return Ok(Palette::of_study());
     }
-    let failed = |words: String| StudyError::Palette { typed: typed.clone().into_owned(), words };
+    let failed = |words: String| PaletteError { typed: typed.clone().into_owned(), words };
     let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || path.is_file());
     let names = if is_file {
         Cow::Owned(input::text(path, LARGEST).map_err(|error| failed(format!("cannot read it: {error}")))?)

@@ -1,7 +1,7 @@
 //! A study: inputs, definitions and a filter, opened and scanned once; every answer is a function of it.
 //!
 //! ```text
-//! Study::open ──► definitions, filter, metrics, by ──► scan ──► episodes, timelines, losses, input hashes
+//! Study::open ──► definitions, filter, metrics, by ──► scan ──► episodes, timelines, lost episodes, input hashes
 //!                                                              │
 //!                                                           grouped ──► counted episodes and cells
 //!                                                              │
@@ -21,9 +21,12 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod agreement;
+mod agreement_text;
 pub mod audit;
 mod caveats;
+pub mod contents;
 mod copies;
+mod design;
 pub mod diff;
 mod empty_filter;
 mod error;
@@ -32,9 +35,10 @@ pub mod explain;
 pub mod figure;
 pub mod findings;
 pub mod gate;
-mod grouped;
 pub mod import;
 pub mod inputs;
+pub mod labels;
+mod limits;
 pub mod losses;
 pub mod overview;
 pub mod own_definitions;
@@ -54,7 +58,9 @@ pub mod sensitivity;
 pub mod spark;
 pub mod statistics;
 mod study;
+mod tables;
 pub mod verify;
 
-pub use error::StudyError;
+pub use agreement_text::agreement_text;
+pub use error::{ErrorKind, StudyError};
 pub use study::Study;

@@ -4,20 +4,21 @@
 //! all of them as failures; the answer says which. A file of scores keeps their rows, marked by the label `lost`.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::path::{Path, PathBuf};
 
-use crate::StudyError;
 use crate::results::Results;
+use crate::{Study, StudyError};
 use mirrorstats_analysis::statistics::Replies;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind};
-use mirrorstats_score::cells::group::CONDITION;
-use mirrorstats_score::quality::{CellKey, QualityByCell};
 use mirrorstats_score::tables::builder::TableBuilder;
 use mirrorstats_score::tables::lost_counts::LostCounts;
-use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, LOST, LabelColumn, UNUSABLE_REPLIES};
+use mirrorstats_score::tables::table::{
+    CONDITION, EpisodeTable, KeyRef, LOST, LabelColumn, MetricColumn, UNUSABLE_REPLIES,
+};
 use mirrorstats_trace::beside::lost::{self, LostEpisode};
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::schema::{self, Column};
+use mirrorstats_trace::schema;
 
 const YES: &str = "true";
 
@@ -39,7 +40,7 @@ pub(crate) struct Counted {
 impl Counted {
     /// The episodes that count, and how many were lost.
     pub(crate) fn of(results: Results, lost_as: LostAs) -> Self {
-        let lost = counts(&results.episodes);
+        let lost = LostCounts::of_table(&results.episodes);
         if lost.is_empty() {
             return Self { results, all: None, lost };
         }
@@ -60,15 +61,31 @@ impl Counted {
     }
 }
 
-pub(crate) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
-    let mut listed = lost::beside(inputs)?;
+/// The episodes in the lists beside the inputs that no trace has. A list may be of more models than the inputs: those
+/// without any episode count only if the inputs are all traces of their folders, without a filter.
+pub(crate) fn unrecorded(study: &Study, table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
+    let mut listed = lost::beside(&study.inputs)?;
     if listed.is_empty() {
         return Ok(listed);
     }
     let ids: HashSet<&str> = table.keys.iter().map(|key| key.episode_id).collect();
-    let models: BTreeSet<&str> = table.keys.models().iter().flatten().collect();
-    listed.retain(|episode| !ids.contains(episode.episode_id.as_str()) && models.contains(episode.model.as_str()));
+    let models: BTreeSet<&str> = table.keys.model.iter().flatten().collect();
+    let is_whole = study.question.filter.is_none() && are_whole_folders(&study.inputs);
+    let is_known = |episode: &LostEpisode| is_whole || models.contains(episode.model.as_str());
+    listed.retain(|episode| !ids.contains(episode.episode_id.as_str()) && is_known(episode));
     Ok(listed)
+}
+
+fn are_whole_folders(given: &[Input]) -> bool {
+    let paths: BTreeSet<&Path> = given.iter().map(|input| input.path.as_path()).collect();
+    let folders: BTreeSet<&Path> = given.iter().filter_map(|input| input.path.parent()).collect();
+    let inside = |folder: &Path| {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let files = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        files.filter(|path| path.extension().is_some_and(|extension| extension == "parquet")).collect::<Vec<_>>()
+    };
+    let is_given = |path: PathBuf| paths.contains(path.strip_prefix(".").unwrap_or(&path)) || paths.contains(&*path);
+    folders.into_iter().flat_map(inside).all(is_given)
 }
 
 pub(crate) fn label(results: &mut Results) {
@@ -85,34 +102,13 @@ pub(crate) fn label(results: &mut Results) {
             let values = (0..episodes.len()).map(text).collect();
             episodes.labels.push(LabelColumn { name: UNUSABLE_REPLIES.to_owned(), values });
         }
-        count(quality, &counts(episodes), lost.is_some() || !episodes.declared.unrecorded.is_empty());
+        for (key, lost) in LostCounts::of_table(episodes).iter() {
+            quality.0.entry(key.clone()).or_default().lost = Some(*lost);
+        }
+        if lost.is_some() || !episodes.declared.unrecorded.is_empty() {
+            quality.0.values_mut().for_each(|quality| quality.lost = quality.lost.or(Some(0)));
+        }
     }
-}
-
-fn count(quality: &mut QualityByCell, lost: &LostCounts, is_known: bool) {
-    for (key, lost) in lost.iter() {
-        quality.0.entry(key.clone()).or_default().lost = Some(*lost);
-    }
-    if is_known {
-        quality.0.values_mut().for_each(|quality| quality.lost = quality.lost.or(Some(0)));
-    }
-}
-
-fn counts(table: &EpisodeTable) -> LostCounts {
-    let mut counts = LostCounts::default();
-    for row in (0..table.len()).filter(|row| table.is_lost(*row)) {
-        let key = table.keys.get(row);
-        counts.add(cell(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row))));
-    }
-    for episode in &table.declared.unrecorded {
-        counts.add(cell(&episode.experiment, &episode.model, episode.condition.as_deref()));
-    }
-    counts
-}
-
-fn cell(experiment: &str, model: &str, condition: Option<&str>) -> CellKey {
-    let condition = condition.or_else(|| schema::column(CONDITION).and_then(Column::default_text)).unwrap_or_default();
-    CellKey { experiment: experiment.to_owned(), model: model.to_owned(), condition: condition.to_owned() }
 }
 
 /// A line that names the cells with lost episodes or replies without a decision; `None` without any.
@@ -175,7 +171,7 @@ fn with_failures(table: &EpisodeTable) -> EpisodeTable {
             CONDITION => episode.condition.as_deref().or_else(|| schema::column(CONDITION)?.default_text()),
             _ => None,
         };
-        let failure = |metric: &mirrorstats_score::tables::table::MetricColumn| failure(&table.catalog, &metric.name);
+        let failure = |metric: &MetricColumn| failure(&table.catalog, &metric.name);
         builder.push(key, table.labels.iter().map(label), table.metrics.iter().map(failure));
     }
     EpisodeTable { declared: table.declared.clone(), ..builder.finish() }

@@ -4,11 +4,11 @@ use crate::figure::{Drawings, FigureInputs};
 use crate::losses::Counted;
 use crate::results::Results;
 use crate::statistics::statistics;
+use crate::tables::tables;
 use crate::{Study, StudyError};
 use mirrorstats_analysis::statistics::Options;
 use mirrorstats_report::bundle::Manifest;
 use mirrorstats_report::html::{self, Page};
-use mirrorstats_report::layout::quality;
 use mirrorstats_report::style::Style;
 use mirrorstats_score::cells::{Cells, KeyValue};
 use mirrorstats_trace::schema::SCHEMA_VERSION;
@@ -41,9 +41,7 @@ pub fn overview(study: &Study, results: Results, style: &str, part: Part) -> Res
         Part::Figures => FigureInputs::of_a_report(results, &style)?.draw_all(),
         Part::Tables | Part::Statistics => Drawings::default(),
     };
-    let svgs = drawings.svgs();
-    let (tables, ranks) = grouped.tables(&style)?;
-    let lists: Vec<_> = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
+    let (tables, lists) = tables(&grouped, &style)?;
     let manifest = Manifest::new(cells, &style, SCHEMA_VERSION, study.question.filter.clone(), results.inputs.clone());
     let names: &[&str] = match part {
         Part::Tables if !lists.is_empty() => &["tables", "lists", "definitions"],
@@ -56,7 +54,7 @@ pub fn overview(study: &Study, results: Results, style: &str, part: Part) -> Res
         cells,
         episodes: &results.episodes,
         manifest: &manifest,
-        figures: &drawings.on_page(&svgs),
+        figures: &drawings.drawn,
         statistics: statistics.as_ref(),
         lists: &lists,
         recordings: None,

@@ -6,16 +6,72 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use crate::StudyError;
-use crate::question::{DEFAULT_DEFINITIONS, Question};
+use crate::error::kinds;
+use crate::{ErrorKind, StudyError};
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_metric::file;
+use mirrorstats_metric::file::{self, FileError};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::footers::declared_experiment::DeclaredExperiment;
 use mirrorstats_trace::read::open::{TraceFile, TraceSet};
-use mirrorstats_trace::schema::{Domain, RECORDING_KEY};
+use mirrorstats_trace::schema::RECORDING_KEY;
 use serde::Deserialize;
+
+pub(crate) const DEFAULT_DEFINITIONS: &str = "paper";
+
+#[derive(Debug, thiserror::Error)]
+pub enum OwnDefinitionsError {
+    #[error("expected experiments that the same definitions score, found {}", differing(.groups))]
+    Differ { groups: Vec<ScoredAlike> },
+    #[error(
+        "{}: expected the definition file `{}`{}, which scores these episodes, found its name alone\n  \
+         help: a trace carries no definition file: give it with --definitions FILE",
+        .group.experiments.iter().map(String::as_str).collect::<Vec<_>>().join(", "),
+        .group.definitions,
+        .group.hash.as_deref().map(|hash| format!(" (sha256 {hash})")).unwrap_or_default()
+    )]
+    Elsewhere { group: ScoredAlike },
+    #[error(
+        "expected traces that carry the same definitions, found `{}` in {} and `{}` in {}\n  \
+         help: name the definitions for all of them with --definitions, or give the files one by one",
+        .names[0], .files[0], .names[1], .files[1]
+    )]
+    CarriedDiffer { files: [String; 2], names: [String; 2] },
+    #[error(
+        "`{file}` has no column of the domain `mirror`: expected definitions of its own domain, found `{definitions}`\n  \
+         help: give --definitions a file with `domain = \"NAME\"` and a `[column.NAME]` for each column that it reads"
+    )]
+    OtherDomain { file: String, definitions: String },
+}
+
+impl From<OwnDefinitionsError> for StudyError {
+    fn from(error: OwnDefinitionsError) -> Self {
+        let is_elsewhere = matches!(error, OwnDefinitionsError::Elsewhere { .. });
+        Self::new(if is_elsewhere { ErrorKind::Definitions } else { ErrorKind::Input }, error)
+    }
+}
+
+/// Requested definitions do not score an experiment whose own definitions would.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{experiment}: expected definitions that score it, as `{own}` do, found `{definitions}`, whose zeros would mean nothing\n  \
+     help: leave --definitions out, or give --definitions {own}; a file of your own scores it with `include = [\"{own}\"]`, \
+     or with a table `[experiment.{experiment}]`; `--where` leaves its episodes out"
+)]
+pub(crate) struct NotScored {
+    pub experiment: String,
+    pub definitions: String,
+    pub own: String,
+}
+
+kinds! { Definitions: NotScored; }
+
+fn differing(groups: &[ScoredAlike]) -> String {
+    let one = |group: &ScoredAlike| format!("`{}` for {}", group.definitions, group.condition);
+    let ask = |group: &ScoredAlike| format!("--where \"{}\" --definitions {}", group.condition, group.definitions);
+    let found = groups.iter().map(one).collect::<Vec<_>>().join(", ");
+    format!("{found}\n  help: ask for each by itself: {}", groups.iter().map(ask).collect::<Vec<_>>().join("; or "))
+}
 
 /// Experiments that the same definitions score.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,8 +102,8 @@ impl Carried {
         Self { name: definitions.catalog.name.clone(), text: definitions.as_one_file() }
     }
 
-    pub(crate) fn load(&self, columns: &Columns) -> Result<Definitions, StudyError> {
-        Ok(Definitions::from_toml(&self.name, &self.text, columns)?)
+    pub(crate) fn load(&self, columns: &Columns) -> Result<Definitions, FileError> {
+        Definitions::from_toml(&self.name, &self.text, columns)
     }
 
     fn of_file(file: &TraceFile) -> Option<Self> {
@@ -59,13 +115,13 @@ impl Carried {
 }
 
 /// The definitions that these traces carry; `None` if no trace carries any.
-pub(crate) fn carried(traces: &TraceSet) -> Result<Option<Carried>, StudyError> {
+pub(crate) fn carried(traces: &TraceSet) -> Result<Option<Carried>, OwnDefinitionsError> {
     let mut found: Option<(&TraceFile, Carried)> = None;
     for file in traces.files() {
         match (Carried::of_file(file), &found) {
             (Some(own), Some((first, known))) if own != *known => {
                 let files = [first.name(), file.name()].map(str::to_owned);
-                return Err(StudyError::CarriedDefinitionsDiffer { files, names: [known.name.clone(), own.name] });
+                return Err(OwnDefinitionsError::CarriedDiffer { files, names: [known.name.clone(), own.name] });
             }
             (Some(own), None) => found = Some((file, own)),
             _ => {}
@@ -131,66 +187,30 @@ fn groups(traces: &TraceSet) -> Vec<ScoredAlike> {
 }
 
 /// The definitions that score all experiments of some traces as their own definitions do; `None` for the default ones.
-pub(crate) fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
+pub(crate) fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, OwnDefinitionsError> {
     let groups = groups(traces);
     match &groups[..] {
         [] => Ok(None),
         [one] if one.is_built_in() => {
             Ok(Some(&one.definitions).filter(|name| *name != DEFAULT_DEFINITIONS).map(PathBuf::from))
         }
-        [one] => Err(StudyError::DefinitionsElsewhere { group: one.clone() }),
-        _ => Err(StudyError::DefinitionsDiffer { groups }),
-    }
-}
-
-impl Question {
-    /// Fills in the definitions that the experiments of these traces name, unless the question requests others.
-    pub fn resolved(mut self, traces: &TraceSet) -> Result<Self, StudyError> {
-        self.carried = if self.definitions.is_none() { carried(traces)? } else { None };
-        if self.carried.is_some() {
-            return Ok(self);
-        }
-        if traces.domain() == Domain::Own {
-            check_domain(self.definitions_name(), traces)?;
-        }
-        if self.definitions.is_some() {
-            return Ok(self);
-        }
-        match chosen(traces) {
-            Ok(name) => self.definitions = name,
-            Err(StudyError::DefinitionsDiffer { groups })
-                if self.each && groups.iter().all(ScoredAlike::is_built_in) =>
-            {
-                self.parts = groups;
-            }
-            Err(error) => return Err(error),
-        }
-        Ok(self)
-    }
-
-    pub(crate) fn load(&self, columns: &Columns) -> Result<Definitions, StudyError> {
-        if self.definitions.is_none() && !self.parts.is_empty() {
-            let whole = side_by_side(&self.parts, columns)?;
-            return whole.ok_or_else(|| StudyError::DefinitionsDiffer { groups: self.parts.clone() });
-        }
-        match &self.carried {
-            Some(carried) => carried.load(columns),
-            None => Ok(Definitions::load(self.definitions_name(), columns)?),
-        }
+        [one] => Err(OwnDefinitionsError::Elsewhere { group: one.clone() }),
+        _ => Err(OwnDefinitionsError::Differ { groups }),
     }
 }
 
 /// Refuses definitions of the mirror for traces of another domain. Unreadable definitions are reported when loaded.
-fn check_domain(definitions: &Path, traces: &TraceSet) -> Result<(), StudyError> {
+pub(crate) fn check_domain(definitions: &Path, traces: &TraceSet) -> Result<(), OwnDefinitionsError> {
     let is_mirror = file::read(definitions).is_ok_and(|document| document.domain.is_none());
     let first = traces.files().first().filter(|_| is_mirror);
     first.map_or(Ok(()), |first| {
-        Err(StudyError::OtherDomain { file: first.name().to_owned(), definitions: definitions.display().to_string() })
+        let (file, definitions) = (first.name().to_owned(), definitions.display().to_string());
+        Err(OwnDefinitionsError::OtherDomain { file, definitions })
     })
 }
 
 /// All experiments in one, each under its own definitions; `None` if two of them define one name differently.
-fn side_by_side(groups: &[ScoredAlike], columns: &Columns) -> Result<Option<Definitions>, StudyError> {
+pub(crate) fn side_by_side(groups: &[ScoredAlike], columns: &Columns) -> Result<Option<Definitions>, FileError> {
     let part = |group: &ScoredAlike| {
         let definitions = Definitions::load(&group.definitions, columns)?;
         let elsewhere = |name: &&String| groups.iter().any(|other| other.experiments.contains(*name));
@@ -198,12 +218,16 @@ fn side_by_side(groups: &[ScoredAlike], columns: &Columns) -> Result<Option<Defi
         let experiments = group.experiments.iter().chain(known).cloned().collect();
         Ok((definitions, experiments))
     };
-    let parts = groups.iter().map(part).collect::<Result<Vec<_>, StudyError>>()?;
+    let parts = groups.iter().map(part).collect::<Result<Vec<_>, FileError>>()?;
     Ok(Definitions::side_by_side(&parts, columns).transpose()?)
 }
 
 /// Refuses definitions that do not score an experiment whose own definitions would: a false zero is no score.
-pub(crate) fn check(definitions: &Definitions, traces: &TraceSet, episodes: &EpisodeTable) -> Result<(), StudyError> {
+pub(crate) fn check_scored(
+    definitions: &Definitions,
+    traces: &TraceSet,
+    episodes: &EpisodeTable,
+) -> Result<(), NotScored> {
     unscored(definitions, traces, |name| episodes.keys.iter().any(|key| key.experiment == name)).map_or(Ok(()), Err)
 }
 
@@ -211,7 +235,7 @@ pub(crate) fn unscored(
     definitions: &Definitions,
     traces: &TraceSet,
     is_kept: impl Fn(&str) -> bool,
-) -> Option<StudyError> {
+) -> Option<NotScored> {
     let declared = traces.files().iter().flat_map(TraceFile::experiments);
     let mut not_scored = declared.filter_map(|declared| {
         let (own, hash) = own(declared)?;
@@ -219,5 +243,5 @@ pub(crate) fn unscored(
     });
     let (experiment, own) = not_scored.find(|(name, _)| is_kept(name))?;
     let (experiment, definitions) = (experiment.clone(), definitions.catalog.name.clone());
-    Some(StudyError::NotScored { experiment, definitions, own })
+    Some(NotScored { experiment, definitions, own })
 }

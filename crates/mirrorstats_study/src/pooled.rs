@@ -6,18 +6,33 @@
 use std::collections::BTreeMap;
 
 use crate::StudyError;
-use mirrorstats_analysis::comparable::{FINGERPRINT, Recorded, Varied, difference};
+use crate::error::kinds;
+use mirrorstats_analysis::comparable::{FINGERPRINT, ORIGIN, Recorded, Varied, difference};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_score::cells::group::{CONDITION, membership};
-use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::cells::group::{GroupError, membership};
+use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, TextColumn};
+
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{cell}: expected episodes that were recorded alike, found {counts}: {differences}; for example {episodes}\n  help: {help}"
+)]
+pub(crate) struct PooledError {
+    cell: String,
+    episodes: String,
+    counts: String,
+    differences: String,
+    help: String,
+}
+
+kinds! { Input: PooledError; }
 
 fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {
-    let Some(fingerprints) = table.label(FINGERPRINT) else { return Vec::new() };
+    let settings: Vec<&TextColumn> = [FINGERPRINT, ORIGIN].into_iter().filter_map(|name| table.label(name)).collect();
     let mut cells: BTreeMap<_, (usize, Option<usize>)> = BTreeMap::new();
     for (row, group) in groups.iter().enumerate() {
-        let cell = (*group, table.keys.experiments().code(row), table.keys.models().code(row));
+        let cell = (*group, table.keys.experiment.code(row), table.keys.model.code(row));
         let (first, other) = cells.entry(cell).or_insert((row, None));
-        if fingerprints.get(*first) != fingerprints.get(row) {
+        if settings.iter().any(|setting| setting.get(*first) != setting.get(row)) {
             other.get_or_insert(row);
         }
     }
@@ -30,13 +45,13 @@ fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {
 pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyError> {
     let groups = membership(table, by)?;
     match mixed(table, &groups).first() {
-        Some(rows) => Err(pooled(table, by, &groups, *rows)),
+        Some(rows) => Err(pooled(table, by, &groups, *rows).into()),
         None => Ok(()),
     }
 }
 
 /// The mixtures in pooled cells, one sentence each; empty without any.
-pub(crate) fn mixtures(table: &EpisodeTable, by: &[String]) -> Result<Vec<String>, StudyError> {
+pub(crate) fn mixtures(table: &EpisodeTable, by: &[String]) -> Result<Vec<String>, GroupError> {
     let groups = membership(table, by)?;
     let words = |rows: &[usize; 2]| {
         let key = table.keys.get(rows[0]);
@@ -48,16 +63,14 @@ pub(crate) fn mixtures(table: &EpisodeTable, by: &[String]) -> Result<Vec<String
 
 fn differences(table: &EpisodeTable, rows: [usize; 2]) -> String {
     let [one, other] = rows.map(|row| Recorded::of(table, [row].into_iter()));
-    if !one.is_declared() || !other.is_declared() {
-        return "some have no fingerprint".to_owned();
-    }
     match difference(&table.declared, [&one, &other], Varied::Nothing) {
+        _ if one.is_declared() != other.is_declared() => "some have no fingerprint".to_owned(),
         Some(setting) => format!("they differ in {setting}"),
         None => "the traces do not say in what they differ".to_owned(),
     }
 }
 
-fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2]) -> StudyError {
+fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2]) -> PooledError {
     let [one, other] = rows.map(|row| table.keys.get(row));
     let fingerprint = |row: usize| table.label(FINGERPRINT).and_then(|column| column.get(row)).unwrap_or_default();
     let is_in_cell = |row: usize| {
@@ -72,8 +85,13 @@ fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2
     } else {
         "record them with --condition NAME, or group by condition where they have one".to_owned()
     };
+    let help = if rows.iter().any(|row| fingerprint(*row).contains('/')) {
+        "the files give one name to different recordings: leave some of the files out".to_owned()
+    } else {
+        help
+    };
     let kept = rows.map(fingerprint).into_iter().find(|name| !name.is_empty()).unwrap_or_default();
-    StudyError::Pooled {
+    PooledError {
         cell: format!("{}, {}", visible(one.experiment), visible(one.model)),
         episodes: format!("`{}` and `{}`", visible(one.episode_id), visible(other.episode_id)),
         counts: counts.join(", "),

@@ -4,11 +4,11 @@
 //! reported together, and no report is made without them.
 
 use std::ffi::OsStr;
-use std::fmt;
 use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use crate::error::kinds;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::{hash, input};
 use mirrorstats_report::bundle::{self, MANIFEST, Manifest};
@@ -25,46 +25,19 @@ pub enum ProvenanceError {
     #[error("{}: expected a file or folder that can be read, found {source}; check its permissions", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
     #[error("{} of {all} traces of the report have changed:\n{}\n{REMEDY}", faults.len(), lines(faults))]
-    Traces { all: usize, faults: Vec<TraceFault> },
+    Traces { all: usize, faults: Vec<String> },
 }
+
+kinds! { Input: ProvenanceError; }
 
 const REMEDY: &str = "  help: restore them, say where they are with --traces, or make a new report of what there is with `mirrorstats report`";
 
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TraceFault {
-    pub path: String,
-    pub expected: String,
-    /// The file found instead, with its path; `None` if there is no such file.
-    pub found: Option<(Found, PathBuf)>,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Found {
-    Other(String),
-    Unreadable(String),
-}
-
-impl fmt::Display for TraceFault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { path, expected, found } = self;
-        match found {
-            None => write!(f, "  {path}: missing; expected sha256 {expected}"),
-            Some((Found::Other(hash), at)) => {
-                write!(f, "  {path}: changed; expected sha256 {expected}, found {hash} in {}", at.display())
-            }
-            Some((Found::Unreadable(why), at)) => {
-                write!(f, "  {path}: cannot read `{}`: {why}; expected sha256 {expected}", at.display())
-            }
-        }
-    }
-}
-
 /// The most traces that a message lists, so that the remedy stays visible.
-const TOLD: usize = 5;
+const LISTED: usize = 5;
 
-fn lines(faults: &[TraceFault]) -> String {
-    let mut lines: Vec<String> = faults.iter().take(TOLD).map(ToString::to_string).collect();
-    if let Some(more) = faults.len().checked_sub(TOLD).filter(|more| *more > 0) {
+fn lines(faults: &[String]) -> String {
+    let mut lines: Vec<String> = faults.iter().take(LISTED).map(|fault| format!("  {fault}")).collect();
+    if let Some(more) = faults.len().checked_sub(LISTED).filter(|more| *more > 0) {
         lines.push(format!("  and {more} more"));
     }
     lines.join("\n")
@@ -111,8 +84,10 @@ pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     }
 }
 
-fn is_plain(path: &str) -> bool {
-    !path.is_empty() && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
+/// Returns true for a path inside its folder, `/` between its parts.
+pub(crate) fn is_plain(path: &str) -> bool {
+    let is_name = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
+    path.split('/').all(is_name)
 }
 
 /// The traces of a manifest, by their names in it, searched in `places` in order.
@@ -128,16 +103,20 @@ pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, Pro
     if faults.is_empty() { Ok(found) } else { Err(ProvenanceError::Traces { all, faults }) }
 }
 
-fn find(wanted: &bundle::InputFile, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
-    let mut other = None;
+/// The file of this hash in the first place that has it. The error says what the first file of this name was.
+fn find(wanted: &bundle::InputFile, places: &[PathBuf]) -> Result<PathBuf, String> {
+    let bundle::InputFile { path: name, sha256: expected, .. } = wanted;
+    let mut fault = None;
     for path in places.iter().flat_map(|place| candidates(wanted, place)) {
-        match input::open(&path).and_then(hash::of_reader) {
-            Ok(hash) if hash == wanted.sha256 => return Ok(path),
-            Ok(hash) => other = other.or(Some((Found::Other(hash), path))),
-            Err(error) => other = other.or(Some((Found::Unreadable(error.to_string()), path))),
-        }
+        let at = path.display();
+        let found = match input::open(&path).and_then(hash::of_reader) {
+            Ok(hash) if hash == *expected => return Ok(path),
+            Ok(hash) => format!("{name}: changed; expected sha256 {expected}, found {hash} in {at}"),
+            Err(error) => format!("{name}: cannot read `{at}`: {error}; expected sha256 {expected}"),
+        };
+        fault.get_or_insert(found);
     }
-    Err(TraceFault { path: wanted.path.clone(), expected: wanted.sha256.clone(), found: other })
+    Err(fault.unwrap_or_else(|| format!("{name}: missing; expected sha256 {expected}")))
 }
 
 fn candidates(wanted: &bundle::InputFile, place: &Path) -> Vec<PathBuf> {

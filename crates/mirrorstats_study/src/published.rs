@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::tables::tables;
 use crate::{Study, StudyError};
 use mirrorstats_report::published;
 use mirrorstats_report::published::comparison::{self, PublishedComparison, choose};
@@ -16,6 +17,6 @@ pub fn compare(study: &Study, published: &Path, style: &Path) -> Result<Publishe
     let published = published::read(published)?;
     let errata = if style == Path::new("paper") { errata::of_paper() } else { Vec::new() };
     let style = Style::load(style)?;
-    let (tables, _) = study.grouped()?.tables(&style)?;
+    let (tables, _) = tables(&study.grouped()?, &style)?;
     Ok(comparison::compare(choose(&tables, &published, &style)?, &published, &errata))
 }

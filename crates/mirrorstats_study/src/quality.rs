@@ -4,11 +4,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::results::Results;
-use crate::scan::{UNCHECKED, ids, lost_episodes};
+use crate::scan::{UNCHECKED, score_with_losses};
 use crate::{Study, StudyError};
+use mirrorstats_analysis::statistics::DesignAudit;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, QualityReader};
-use mirrorstats_score::score_traces::{self, Scored};
+use mirrorstats_score::score_traces::Outputs;
 use mirrorstats_score::tables::table::CONDITION;
 use mirrorstats_score::vocabulary;
 use mirrorstats_trace::beside::lost;
@@ -26,7 +27,7 @@ pub struct QualityLimits {
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QualityCheckAnswer {
-    /// True if every limit could be checked and none is exceeded.
+    /// True if every limit could be checked, none is exceeded, and the audit found nothing.
     pub holds: bool,
     /// The limits that are exceeded.
     pub violations: Vec<Violation>,
@@ -34,6 +35,9 @@ pub struct QualityCheckAnswer {
     pub not_recorded: Vec<NotRecorded>,
     /// Every cell.
     pub cells: Vec<CellAnswer>,
+    /// The design audit; absent unless asked for. A finding fails the check.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub design: Option<DesignAudit>,
 }
 
 /// A limit that is exceeded.
@@ -92,11 +96,11 @@ impl CellAnswer {
 }
 
 impl QualityCheckAnswer {
-    /// Checks the reply quality of cells against limits.
-    pub fn of(cells: &QualityByCell, limits: QualityLimits) -> Self {
+    pub fn of(cells: &QualityByCell, limits: QualityLimits, design: Option<DesignAudit>) -> Self {
         let (violations, not_recorded) = (limits.violations(cells), limits.not_recorded(cells));
-        let holds = violations.is_empty() && not_recorded.is_empty();
-        Self { holds, violations, not_recorded, cells: CellAnswer::of_all(cells) }
+        let is_sound = design.as_ref().is_none_or(|design| design.findings.is_empty());
+        let holds = violations.is_empty() && not_recorded.is_empty() && is_sound;
+        Self { holds, violations, not_recorded, cells: CellAnswer::of_all(cells), design }
     }
 }
 
@@ -112,18 +116,13 @@ pub fn has_quality(study: &Study) -> Result<bool, StudyError> {
 pub fn quality(study: &Study) -> Result<QualityByCell, StudyError> {
     let traces = study.traces()?;
     let reader = QualityReader::of(traces);
-    let columns = vocabulary::trace_columns(traces);
-    let all = Definitions::from_toml("all", "open = true", &columns)?;
-    let nobody = all.clone().filtered("nobody", "false", &columns)?;
-    let lost = lost_episodes(traces)?;
+    let all = Definitions::without_metrics(&vocabulary::trace_columns(traces))?;
     let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
     let (quality, unchecked) = (Some(&reader), &UNCHECKED[..]);
-    let wanted = score_traces::Outputs { labels: &labels, quality, unchecked, ..score_traces::Outputs::default() };
-    let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
-    let Scored { tables, quality, .. } = score_traces::score_all(traces, &definitions, wanted, study.threads)?;
-    let [episodes, ended]: [_; 2] = tables.try_into().expect("a table per definitions");
-    let lost = lost.map(|_| ids(&ended));
-    let mut results = Results { lost, quality, ..Results::of(episodes) };
+    let wanted = Outputs { labels: &labels, quality, unchecked, ..Outputs::default() };
+    let (scored, lost) = score_with_losses(traces, &[&all], wanted, study.threads)?;
+    let [episodes] = <[_; 1]>::try_from(scored.tables).expect("a table per definitions");
+    let mut results = Results { lost, quality: scored.quality, ..Results::of(episodes) };
     study.declare(&mut results)?;
     study.check_unchanged()?;
     Ok(results.quality.unwrap_or_default())

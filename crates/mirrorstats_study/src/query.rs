@@ -28,12 +28,12 @@ pub fn query(study: &Study, query: &Checked) -> Result<(LazyFrame, Option<String
         }
     }
     let frame = plan(query, loaded).map_err(|error| match error {
-        QueryError::Faults(faults) => StudyError::Filter(faults),
-        QueryError::Polars(error) => StudyError::Polars(error),
+        QueryError::Faults(faults) => StudyError::from(faults),
+        QueryError::Polars(error) => error.into(),
         QueryError::Unsupported(mut fault) => {
             let other = fault.help.take().map(|help| format!("{help}; or ")).unwrap_or_default();
             let help = format!("{other}{}", in_duckdb(study, query));
-            StudyError::Filter(Faults(vec![fault.help(help)]))
+            Faults(vec![fault.help(help)]).into()
         }
     })?;
     Ok((frame, note))

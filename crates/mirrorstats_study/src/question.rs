@@ -4,19 +4,20 @@ use std::path::{Path, PathBuf};
 
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::Definitions;
-use mirrorstats_score::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS};
-use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::cells::group::{DEFAULT_BY, KEY_COLUMNS};
+use mirrorstats_score::tables::table::{CONDITION, EpisodeTable};
 use mirrorstats_score::{score_traces, vocabulary};
 use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::schema::Domain;
 
 use crate::StudyError;
 use crate::losses::LostAs;
-use crate::own_definitions::{Carried, ScoredAlike};
+use crate::own_definitions::{
+    Carried, DEFAULT_DEFINITIONS, OwnDefinitionsError, ScoredAlike, carried, check_domain, chosen, side_by_side,
+};
 
 /// Labels of each episode's recording that scores carry if the traces have them.
 pub(crate) const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
-
-pub(crate) const DEFAULT_DEFINITIONS: &str = "paper";
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
@@ -24,6 +25,7 @@ pub struct Question {
     pub definitions: Option<PathBuf>,
     /// True to score experiments that need different definitions each by their own; false to refuse them.
     pub each: bool,
+    /// The experiments by their definitions, if each is scored by its own; else empty.
     pub parts: Vec<ScoredAlike>,
     /// The definitions that the traces carry, if none are requested.
     pub carried: Option<Carried>,
@@ -66,6 +68,38 @@ impl Question {
             DEFAULT_BY.into_iter().chain(condition).map(str::to_owned).collect()
         };
         self.by.clone().unwrap_or_else(default)
+    }
+
+    /// Fills in the definitions that the experiments of these traces name, unless the question requests others.
+    pub fn resolved(mut self, traces: &TraceSet) -> Result<Self, OwnDefinitionsError> {
+        self.carried = if self.definitions.is_none() { carried(traces)? } else { None };
+        if self.carried.is_some() {
+            return Ok(self);
+        }
+        if traces.domain() == Domain::Own {
+            check_domain(self.definitions_name(), traces)?;
+        }
+        if self.definitions.is_some() {
+            return Ok(self);
+        }
+        match chosen(traces) {
+            Err(OwnDefinitionsError::Differ { groups }) if self.each && groups.iter().all(ScoredAlike::is_built_in) => {
+                self.parts = groups;
+            }
+            name => self.definitions = name?,
+        }
+        Ok(self)
+    }
+
+    pub(crate) fn load(&self, columns: &Columns) -> Result<Definitions, StudyError> {
+        if self.definitions.is_none() && !self.parts.is_empty() {
+            let whole = side_by_side(&self.parts, columns)?;
+            return whole.ok_or_else(|| OwnDefinitionsError::Differ { groups: self.parts.clone() }.into());
+        }
+        Ok(match &self.carried {
+            Some(carried) => carried.load(columns)?,
+            None => Definitions::load(self.definitions_name(), columns)?,
+        })
     }
 
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {

@@ -6,22 +6,25 @@ use std::thread;
 
 use crate::caveats::{departed, selection};
 use crate::copies::copies;
+use crate::design::remove_labels;
+use crate::error::kinds;
 use crate::figure::{Drawings, FigureInputs};
-use crate::grouped::Grouped;
 use crate::inputs::Source;
 use crate::losses::{Counted, LostAs, lost_episodes};
-use crate::question::DEFAULT_DEFINITIONS;
+use crate::own_definitions::DEFAULT_DEFINITIONS;
 use crate::results::{Outputs, Results};
-use crate::statistics::statistics;
+use crate::statistics::{design_audit, statistics};
+use crate::study::Grouped;
+use crate::tables::tables;
 use crate::{Study, StudyError, scores};
 use mirrorstats_analysis::plan::departures::Looks;
-use mirrorstats_analysis::statistics::{Options, Statistics};
+use mirrorstats_analysis::statistics::{DesignAudit, Options, Statistics};
 use mirrorstats_exact::replace;
 use mirrorstats_exact::suggest::hint;
 use mirrorstats_figures::FigureName;
 use mirrorstats_report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
 use mirrorstats_report::html::{self, Page, Recordings};
-use mirrorstats_report::layout::{MetricTable, quality};
+use mirrorstats_report::layout::MetricTable;
 use mirrorstats_report::style::{MAIN_TABLE, OTHER_TABLE, Style};
 use mirrorstats_score::cells::Cells;
 use mirrorstats_score::format::Format;
@@ -33,6 +36,17 @@ use mirrorstats_trace::footers::{answered, renderer};
 use mirrorstats_trace::schema::SCHEMA_VERSION;
 
 pub(crate) const MOST_LISTED: usize = 20_000;
+
+#[derive(Debug, thiserror::Error)]
+#[error("no table of the style `{style}` is named `{name}`; it has {known}{hint}")]
+pub(crate) struct UnknownTable {
+    name: String,
+    style: String,
+    known: String,
+    hint: String,
+}
+
+kinds! { Argument: UnknownTable; }
 
 /// The options of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,18 +110,21 @@ pub fn report(study: &Study, options: &ReportOptions) -> Result<Report, StudyErr
     let style = Style::load(&options.style)?;
     let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
     let outputs =
-        Outputs { losses: true, quality: true, hashes: true, copy_candidates: true, ..Outputs::of_figures(figures) };
+        Outputs { quality: true, hashes: true, copy_candidates: true, design: true, ..Outputs::of_figures(figures) };
     let grouped = study.grouped_with(outputs)?;
     let illustrations = options.figures.then(|| Illustrations::of(&grouped, &style, options.png)).transpose()?;
-    let (tables, ranks) = grouped.tables(&style)?;
-    let Grouped { counted, cells, .. } = grouped;
+    let (tables, lists) = tables(&grouped, &style)?;
+    let audit = design_audit(&grouped)?;
+    let Grouped { mut counted, cells, .. } = grouped;
+    let asked = study.question.labels();
+    remove_labels(&mut counted.results.episodes, &asked);
+    counted.all.iter_mut().for_each(|all| remove_labels(all, &asked));
     let replies = counted.replies().and_then(|replies| replies.sentence());
     let Counted { results, all, lost } = counted;
-    let lists = ranks.into_iter().chain(results.quality.as_ref().and_then(quality::of_cells)).collect();
     let filter = study.question.filter.clone();
     let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
     let mut report = Report {
-        notes: notes(study, &results, &lost)?,
+        notes: notes(study, &results, &lost, &audit)?,
         recordings: recordings(study, &manifest),
         results,
         all,
@@ -138,11 +155,12 @@ impl Illustrations {
     fn of(grouped: &Grouped<'_>, style: &Style, png: bool) -> Result<Self, StudyError> {
         thread::scope(|scope| {
             let statistics = scope.spawn(|| statistics(grouped, &Options::default()));
-            let figures = FigureInputs::of_a_report(&grouped.counted.results, style).and_then(|inputs| {
-                let drawings = inputs.draw_all();
+            let figures = || {
+                let drawings = FigureInputs::of_a_report(&grouped.counted.results, style)?.draw_all();
                 let files = drawings.files(grouped.study.threads, png)?;
                 Ok((drawings, files))
-            });
+            };
+            let figures = figures();
             let statistics = statistics.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
             Ok(Self { statistics, figures })
         })
@@ -159,7 +177,7 @@ fn recordings(study: &Study, manifest: &Manifest) -> Option<Recordings> {
     })
 }
 
-fn notes(study: &Study, results: &Results, lost: &LostCounts) -> Result<Vec<String>, StudyError> {
+fn notes(study: &Study, results: &Results, lost: &LostCounts, audit: &DesignAudit) -> Result<Vec<String>, StudyError> {
     let episodes = &results.episodes;
     let mut notes: Vec<String> = undeclared(episodes).into_iter().chain(registered(episodes)).collect();
     if let Source::Traces(set) = &study.source {
@@ -174,6 +192,7 @@ fn notes(study: &Study, results: &Results, lost: &LostCounts) -> Result<Vec<Stri
         };
         notes.push(format!("{}: {counted}; see tables/quality.md", lost_episodes(lost.total())));
     }
+    notes.extend(audit.findings.iter().map(|it| it.finding.clone()));
     notes.extend(copies(study, results)?.map(|copies| copies.sentence));
     let own = Options { selection: selection(study, episodes), ..Options::default() };
     let departures = departed(study, episodes, &own, Looks::Once).into_iter().flatten();
@@ -218,11 +237,11 @@ impl Report {
 
     /// The table of this name. Errors: a name that the style lacks; the error lists its tables.
     pub fn table(&self, name: &str) -> Result<&MetricTable, StudyError> {
-        self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
+        let found = self.tables.iter().find(|table| table.name == name);
+        found.ok_or_else(|| {
             let known = || self.tables.iter().map(|table| table.name.as_str());
-            let (style, known, hint) =
-                (self.style.name.clone(), known().collect::<Vec<_>>().join(", "), hint(name, known()));
-            StudyError::NoTable { name: name.to_owned(), style, known, hint }
+            let (known, hint) = (known().collect::<Vec<_>>().join(", "), hint(name, known()));
+            UnknownTable { name: name.to_owned(), style: self.style.name.clone(), known, hint }.into()
         })
     }
 
@@ -256,13 +275,12 @@ impl Report {
     }
 
     fn page(&self, drawings: &Drawings, statistics: &Statistics) -> Result<String, StudyError> {
-        let svgs = drawings.svgs();
         Ok(html::render(&Page {
             tables: &self.tables,
             cells: &self.cells,
             episodes: &self.results.episodes,
             manifest: &self.manifest,
-            figures: &drawings.on_page(&svgs),
+            figures: &drawings.drawn,
             statistics: Some(statistics),
             lists: &self.lists,
             recordings: self.recordings.as_ref(),

@@ -7,16 +7,42 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use crate::diff::{Diff, Pair, Scored};
-use crate::losses::LostAs;
+use crate::provenance::ProvenanceError;
 use crate::question::Question;
 use crate::report::{Report, ReportOptions, check_folder, report};
-use crate::{Study, StudyError, provenance};
+use crate::{ErrorKind, Study, StudyError, provenance};
 use mirrorstats_exact::input;
 use mirrorstats_report::bundle::{Manifest, Output};
 use mirrorstats_report::style::Style;
 use mirrorstats_score::format::{self, Partition};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::inputs::Input;
+
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RescoreError {
+    #[error(
+        "{out}: expected a folder beside the report, found the report itself\n  \
+         help: the old report stays as it is; give another --out"
+    )]
+    OntoItself { out: String },
+    #[error(
+        "the style `{name}` changed since the report was made: expected sha256 {expected}, found {found}\n  \
+         help: name the style with --style"
+    )]
+    StyleChanged { name: String, expected: String, found: String },
+    #[error(
+        "the report's style `{name}` (sha256 {expected}) was a file, and a manifest keeps no paths\n  \
+         help: name the style with --style"
+    )]
+    StyleGone { name: String, expected: String },
+}
+
+impl From<RescoreError> for StudyError {
+    fn from(error: RescoreError) -> Self {
+        let is_output = matches!(error, RescoreError::OntoItself { .. });
+        Self::new(if is_output { ErrorKind::Output } else { ErrorKind::Input }, error)
+    }
+}
 
 /// The report to remake, and the changes.
 #[derive(Clone, Debug)]
@@ -38,8 +64,8 @@ pub struct RescoreRequest {
 
 /// The traces of a report, found by their hashes in folders or files. If `places` is empty, searches the current
 /// folder, the report's folder and its parents.
-pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, StudyError> {
-    Ok(provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))?)
+pub fn traces_of(report: &Path, places: &[PathBuf]) -> Result<Vec<Input>, ProvenanceError> {
+    provenance::traces(&provenance::manifest(report)?, &provenance::places(report, places))
 }
 
 #[derive(Debug)]
@@ -78,25 +104,23 @@ impl RescoreRequest {
             metrics: self.metrics.clone().or_else(|| selected.then(|| manifest.metrics.clone())),
             by: Some(manifest.by.clone()),
             pool: true,
-            lost: LostAs::Nothing,
             ..Question::default()
         }
     }
 
     /// The name or path of the style: the report's own unless another is requested.
-    fn style(&self, manifest: &Manifest) -> Result<PathBuf, StudyError> {
+    fn style(&self, manifest: &Manifest) -> Result<PathBuf, RescoreError> {
         if let Some(style) = &self.style {
             return Ok(style.clone());
         }
         let (name, expected) = (manifest.style.name.clone(), manifest.style.sha256.clone());
         match Style::load(&name) {
             Ok(style) if style.hash == expected => Ok(name.into()),
-            Ok(style) => Err(StudyError::StyleChanged { name, expected, found: style.hash }),
-            Err(_) => Err(StudyError::StyleGone { name, expected }),
+            Ok(style) => Err(RescoreError::StyleChanged { name, expected, found: style.hash }),
+            Err(_) => Err(RescoreError::StyleGone { name, expected }),
         }
     }
 
-    /// The scores of the old report, or why they are unavailable.
     fn scores_before(&self, manifest: &Manifest) -> Result<EpisodeTable, String> {
         let path = self.report.join("episodes.parquet");
         let file = input::open(&path).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -117,7 +141,7 @@ pub fn folder_of_rescored(report: &Path, out: Option<&Path>) -> Result<PathBuf, 
         None => beside(report)?,
     };
     if place(&out)? == place(report)? {
-        return Err(StudyError::OntoItself { out: out.display().to_string() });
+        return Err(RescoreError::OntoItself { out: out.display().to_string() }.into());
     }
     Ok(out)
 }

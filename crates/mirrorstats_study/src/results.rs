@@ -7,8 +7,8 @@ use mirrorstats_figures::e5_outcomes::Outcomes;
 use mirrorstats_figures::{FigureName, gaze};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle;
-use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::quality::QualityByCell;
+use mirrorstats_score::tables::table::CONDITION;
 use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, MetricColumn};
 use mirrorstats_score::timeline::Timeline;
 
@@ -20,13 +20,13 @@ pub struct Outputs {
     pub timelines: bool,
     /// Endings of open questions, for the figure `e5-outcomes`.
     pub outcomes: bool,
-    /// The episodes that the infrastructure ended.
-    pub losses: bool,
     pub quality: bool,
     /// The hashes of the inputs.
     pub hashes: bool,
     /// The episodes that may be copies of others.
     pub copy_candidates: bool,
+    /// The labels that the design audit reads.
+    pub design: bool,
 }
 
 impl Outputs {
@@ -47,8 +47,8 @@ pub struct Results {
     pub timelines: Option<Vec<Timeline>>,
     /// The endings of open questions. `None` if not requested, and if there is no such question.
     pub outcomes: Option<Outcomes>,
-    /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` if not requested,
-    /// and if the inputs do not record it.
+    /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` if the inputs do
+    /// not record it.
     pub lost: Option<BTreeSet<String>>,
     /// The reply quality by cell, lost episodes included. `None` if not requested, and for scores.
     pub quality: Option<QualityByCell>,
@@ -87,15 +87,13 @@ impl Results {
             let shown = self.with_conditions_as_models();
             let answered =
                 shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
-            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::from_table(&shown.episodes, &answered));
-            self.outcomes = outcomes;
+            self.outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::from_table(&shown.episodes, &answered));
         }
         if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
             self.timelines = None;
         }
     }
 
-    /// The results of the `most` best models by a metric.
     pub(crate) fn top_models(self, most: usize, metric: &str) -> Self {
         let episodes = &self.episodes;
         let Some(column) = episodes.metric(metric) else { return self };
@@ -106,12 +104,17 @@ impl Results {
         let kept: BTreeSet<&str> = means.iter().take(most).map(|mean| mean.model).collect();
         let is_kept = |row: &usize| kept.contains(episodes.keys.get(*row).model);
         let rows: Vec<usize> = (0..episodes.len()).filter(is_kept).collect();
-        let timelines = self.timelines.as_ref().map(|lines| rows.iter().map(|row| lines[*row].clone()).collect());
         let outcomes = self.outcomes.clone().map(|Outcomes { experiment, mut rows }| {
             rows.retain(|row| kept.contains(row.model.as_str()));
             Outcomes { experiment, rows }
         });
-        Self { episodes: episodes.taken(&rows), timelines, outcomes, ..self }
+        Self { outcomes, ..self.taken(&rows) }
+    }
+
+    /// The results of these rows; everything that is not by episode stays.
+    fn taken(self, rows: &[usize]) -> Self {
+        let timelines = self.timelines.map(|lines| rows.iter().map(|row| lines[*row].clone()).collect());
+        Self { episodes: self.episodes.taken(rows), timelines, ..self }
     }
 }
 

@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use crate::StudyError;
-use crate::inputs::ScoreFile;
+use crate::inputs::{InputError, ScoreFile};
 use crate::question::Question;
 use mirrorstats_exact::input;
 use mirrorstats_metric::definitions::Definitions;
@@ -27,19 +27,19 @@ pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTa
         }
         whole = Some(match whole {
             None => table,
-            Some(whole) => whole.joined(&table).map_err(|error| StudyError::file(&file.input.name, error))?,
+            Some(whole) => whole.joined(&table).map_err(|error| InputError::unreadable(&file.input, error))?,
         });
     }
-    let table = whole.ok_or(StudyError::NoScores)?;
+    let table = whole.ok_or(InputError::NoScores)?;
     Ok(select(table, question.metrics.as_deref(), question.filter.as_deref())?)
 }
 
 fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, StudyError> {
-    let failed = |error| StudyError::file(&file.input.name, error);
-    let bytes = input::open(&file.input.path).map_err(|error| StudyError::file(&file.input.name, error))?;
+    let failed = |error| InputError::unreadable(&file.input, error);
+    let bytes = input::open(&file.input.path).map_err(|error| InputError::unreadable(&file.input, error))?;
     let named = || Definitions::load(question.definitions_name(), &vocabulary::schema_columns());
     if file.format != Format::Parquet {
-        return format::read_text(file.format, &named()?.catalog, bytes).map_err(failed);
+        return Ok(format::read_text(file.format, &named()?.catalog, bytes).map_err(failed)?);
     }
     let named = if file.carries_definitions { None } else { Some(named()?.catalog) };
     let folders = inputs::folder_values(&file.input.path);
@@ -58,16 +58,16 @@ fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTa
         return Ok(table);
     }
     let short = |hash: &str| hash.get(..12).unwrap_or_default().to_owned();
-    Err(StudyError::OtherDefinitions {
+    Err(InputError::OtherDefinitions {
         file: file.input.name.clone(),
         wanted: name.display().to_string(),
         wanted_hash: short(&wanted.hash),
         found: table.catalog.name.clone(),
         found_hash: short(&table.catalog.hash),
-    })
+    }
+    .into())
 }
 
-/// Writes a table; Parquet is encoded by `threads` threads.
 pub fn write(
     table: &EpisodeTable,
     format: Format,

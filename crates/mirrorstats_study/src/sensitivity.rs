@@ -10,16 +10,16 @@ use std::str::FromStr;
 use crate::losses::{self, Counted};
 use crate::question::Question;
 use crate::results::Results;
-use crate::scan::{ids, lost_episodes};
+use crate::scan::score_with_losses;
 use crate::statistics::statistics;
-use crate::{Study, StudyError, own_definitions};
+use crate::{ErrorKind, Study, StudyError, own_definitions};
 use mirrorstats_analysis::statistics::Options;
 use mirrorstats_metric::columns::Columns;
 use mirrorstats_metric::definitions::{Definitions, ReplaceError};
 use mirrorstats_report::sensitivity::{Level, Reference, Sensitivity};
 use mirrorstats_report::style::Style;
 use mirrorstats_score::physical::PhysicalPlan;
-use mirrorstats_score::score_traces::{self, Outputs};
+use mirrorstats_score::score_traces::{self, Outputs, Scored};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::vocabulary;
 use mirrorstats_trace::read::open::TraceSet;
@@ -27,6 +27,8 @@ use mirrorstats_trace::schema::domain::Domain;
 
 /// The column that a threshold applies to.
 const PIXELS: &str = "mirror_self_px";
+/// Counts the steps of an episode without a value in it.
+const MISSING_PIXELS: &str = include_str!("../../../assets/scan/missing_pixels.toml");
 const EVIDENCE: &str = "visible";
 /// The column that records evidence as ground truth.
 const GROUND_TRUTH: &str = "mirror_visible";
@@ -38,6 +40,40 @@ pub const DEFAULT_THRESHOLDS: &str = "1,10,30,60,120,240";
 /// Thresholds, ascending and distinct, px.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Thresholds(Vec<u32>);
+
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum SensitivityError {
+    #[error(
+        "expected traces of the domain `mirror`, whose thresholds of evidence vary here; found another domain\n  \
+         help: write the other threshold into a definition file, and compare it with `mirrorstats diff`"
+    )]
+    NoMirror,
+    #[error(
+        "expected traces with the column `{PIXELS}`, to which a threshold applies: {problem}\n  \
+         help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns"
+    )]
+    NoPixels { problem: String },
+    #[error(
+        "{PIXELS}: expected a value at every step, found {steps} without one, for example in `{episode}`: a threshold does \
+         not say what they show\n  \
+         help: --where \"all({PIXELS} is not null)\" keeps the episodes that have them"
+    )]
+    PixelsMissing { steps: String, episode: String },
+    #[error(
+        "expected a metric that depends on the `let` `{EVIDENCE}`, found none among {metrics}\n  \
+         help: ask for other metrics with --metrics, or let the definitions use `{EVIDENCE}`"
+    )]
+    NothingMoves { metrics: String },
+    #[error("{definitions}: {source}")]
+    Evidence { definitions: String, source: ReplaceError },
+}
+
+impl From<SensitivityError> for StudyError {
+    fn from(error: SensitivityError) -> Self {
+        let is_argument = matches!(error, SensitivityError::NothingMoves { .. });
+        Self::new(if is_argument { ErrorKind::Argument } else { ErrorKind::Input }, error)
+    }
+}
 
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -74,37 +110,45 @@ pub fn sensitivity(study: &Study, thresholds: &Thresholds) -> Result<Sensitivity
     let trial = Trial::of(&study.question, traces, thresholds)?;
     let scored = scan(study, &trial, traces);
     study.check_unchanged()?;
-    let stages = stages(study, &trial, scored?)?;
+    let (tables, lost) = scored?;
+    let stages = stages(study, &trial, tables, lost.as_ref())?;
     let lost = stages.first().map_or(0, |(_, lost)| *lost);
     let levels: Vec<Level> = stages.into_iter().map(|(level, _)| level).collect();
     let found = Sensitivity::from_levels(&levels, &trial.reference, &trial.moved, &trial.unmoved, &style);
     Ok(SensitivityReport { found, notes: trial.notes(lost) })
 }
 
-fn scan(study: &Study, trial: &Trial, traces: &TraceSet) -> Result<Vec<EpisodeTable>, StudyError> {
+/// A table for each threshold after the one of the unchanged definitions, then one of the steps without pixels; and the
+/// lost episodes.
+fn scan(
+    study: &Study,
+    trial: &Trial,
+    traces: &TraceSet,
+) -> Result<(Vec<EpisodeTable>, Option<BTreeSet<String>>), StudyError> {
     let labels = study.question.labels_over(traces);
     let outputs = Outputs { labels: &labels, ..Outputs::default() };
-    let all: Vec<&Definitions> = trial.definitions.iter().chain([&trial.pixels]).chain(trial.lost.as_ref()).collect();
-    let tables = score_traces::score_all(traces, &all, outputs, study.threads)?.tables;
-    tables.first().map_or(Ok(()), |table| own_definitions::check(&trial.definitions[0], traces, table))?;
-    Ok(tables)
+    let all: Vec<&Definitions> = trial.definitions.iter().chain([&trial.pixels]).collect();
+    let (Scored { tables, .. }, lost) = score_with_losses(traces, &all, outputs, study.threads)?;
+    own_definitions::check_scored(&trial.definitions[0], traces, &tables[0])?;
+    Ok((tables, lost))
 }
 
 /// The results of each threshold, with the number of lost episodes.
-fn stages(study: &Study, trial: &Trial, mut tables: Vec<EpisodeTable>) -> Result<Vec<(Level, u64)>, StudyError> {
-    let mut others = tables.split_off(trial.definitions.len()).into_iter();
-    let pixels = others.next();
-    let lost = others.next().map(|table| ids(&table));
+fn stages(
+    study: &Study,
+    trial: &Trial,
+    mut tables: Vec<EpisodeTable>,
+    lost: Option<&BTreeSet<String>>,
+) -> Result<Vec<(Level, u64)>, StudyError> {
+    let pixels = tables.pop().expect("a table per definitions");
     study.check_filter(tables.iter().map(EpisodeTable::len).max().unwrap_or(0))?;
     let counted = |table| {
-        let mut results = Results { lost: lost.clone(), ..Results::of(table) };
+        let mut results = Results { lost: lost.cloned(), ..Results::of(table) };
         study.declare(&mut results)?;
         Ok(Counted::of(results, study.question.lost))
     };
     let counted: Vec<Counted> = tables.into_iter().map(counted).collect::<Result<_, StudyError>>()?;
-    if let Some(pixels) = &pixels {
-        check_values(pixels, counted.iter().map(|counted| &counted.results.episodes))?;
-    }
+    check_values(&pixels, counted.iter().map(|counted| &counted.results.episodes))?;
     let px = [None].into_iter().chain(trial.thresholds.iter().copied().map(Some));
     px.zip(counted).map(|(px, counted)| stage(study, px, counted)).collect()
 }
@@ -123,7 +167,6 @@ struct Trial {
     thresholds: Vec<u32>,
     definitions: Vec<Definitions>,
     pixels: Definitions,
-    lost: Option<Definitions>,
     reference: Reference,
     moved: Vec<String>,
     unmoved: Vec<String>,
@@ -135,27 +178,25 @@ impl Trial {
         let columns = vocabulary::trace_columns(traces);
         let as_is = question.bind(traces)?;
         let bound = |px: u32| under(question, px, &columns);
-        let dependent = Dependent::between(&bound(1)?, &bound(2)?);
-        let (moved, unmoved): (Vec<String>, Vec<String>) =
-            metrics(&as_is).partition(|name| dependent.metrics.contains(name));
+        let (dependent, is_filter_moved) = dependent(&bound(1)?, &bound(2)?);
+        let metrics = as_is.plan.outputs.iter().map(|output| output.name.clone());
+        let (moved, unmoved): (Vec<String>, Vec<String>) = metrics.partition(|name| dependent.contains(name));
         if moved.is_empty() {
-            return Err(StudyError::NothingMoves { name: EVIDENCE, metrics: unmoved.join(", ") });
+            return Err(SensitivityError::NothingMoves { metrics: unmoved.join(", ") }.into());
         }
         let mut definitions = vec![as_is];
         for px in &thresholds.0 {
             definitions.push(score_traces::checked(traces, bound(*px)?)?);
         }
         let is_recorded = definitions[0].catalog.lets.get(EVIDENCE).is_some_and(|text| text.trim() == GROUND_TRUTH);
-        let count = format!("open = true\n[metric.MISSING]\nvalue = \"count({PIXELS} is null)\"\n");
         Ok(Self {
             thresholds: thresholds.0.clone(),
             definitions,
-            pixels: Definitions::from_toml("pixels", &count, &columns)?,
-            lost: lost_episodes(traces)?,
+            pixels: Definitions::from_toml("missing_pixels", MISSING_PIXELS, &columns)?,
             reference: Reference { is_recorded, px: recorded_px(traces) },
             moved,
             unmoved,
-            is_filter_moved: dependent.filter,
+            is_filter_moved,
         })
     }
 
@@ -171,36 +212,28 @@ impl Trial {
     }
 }
 
-fn metrics(definitions: &Definitions) -> impl Iterator<Item = String> + '_ {
-    definitions.plan.outputs.iter().map(|output| output.name.clone())
-}
-
 /// The requested definitions, with evidence from this number of pixels on.
 fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions, StudyError> {
     let as_is = question.load(columns)?;
     let shown = format!("the threshold of {px} px");
     let replaced = as_is.with_condition_let(EVIDENCE, &shown, &format!("{PIXELS} >= {px}"), columns);
     let definitions = replaced.map_err(|source| match source {
-        ReplaceError::Faults(faults) => StudyError::Filter(faults),
-        source => StudyError::EvidenceLet { definitions: question.definitions_name().display().to_string(), source },
+        ReplaceError::Faults(faults) => StudyError::from(faults),
+        source => {
+            let definitions = question.definitions_name().display().to_string();
+            SensitivityError::Evidence { definitions, source }.into()
+        }
     })?;
     question.applied(definitions, columns)
 }
 
-/// The metrics and columns that depend on the evidence, found from two definitions that differ only in it.
-struct Dependent {
-    metrics: BTreeSet<String>,
-    filter: bool,
-}
-
-impl Dependent {
-    fn between(one: &Definitions, other: &Definitions) -> Self {
-        let plan = PhysicalPlan::of(&[&one.plan, &other.plan]);
-        let [one, other] = plan.scores() else { unreachable!("the plan has two sets of definitions") };
-        let pairs = one.metrics.iter().zip(&other.metrics);
-        let metrics = pairs.filter(|(one, other)| one.step != other.step).map(|(one, _)| one.name.clone()).collect();
-        Self { metrics, filter: one.filter != other.filter }
-    }
+/// The metrics that depend on the evidence, and whether the filter does: two definitions differ only in it.
+fn dependent(one: &Definitions, other: &Definitions) -> (BTreeSet<String>, bool) {
+    let plan = PhysicalPlan::of(&[&one.plan, &other.plan]);
+    let [one, other] = plan.scores.as_slice() else { unreachable!("the plan has two sets of definitions") };
+    let pairs = one.metrics.iter().zip(&other.metrics);
+    let metrics = pairs.filter(|(one, other)| one.step != other.step).map(|(one, _)| one.name.clone());
+    (metrics.collect(), one.filter != other.filter)
 }
 
 fn recorded_px(traces: &TraceSet) -> Vec<u64> {
@@ -208,9 +241,9 @@ fn recorded_px(traces: &TraceSet) -> Vec<u64> {
     px.into_iter().collect()
 }
 
-fn check_pixels(traces: &TraceSet) -> Result<(), StudyError> {
+fn check_pixels(traces: &TraceSet) -> Result<(), SensitivityError> {
     if traces.domain() == Domain::Own {
-        return Err(StudyError::NoMirror);
+        return Err(SensitivityError::NoMirror);
     }
     let problem = match traces.column(PIXELS) {
         None => "no trace has it".to_owned(),
@@ -222,11 +255,14 @@ fn check_pixels(traces: &TraceSet) -> Result<(), StudyError> {
             (None, None) => return Ok(()),
         },
     };
-    Err(StudyError::NoPixels { column: PIXELS, problem })
+    Err(SensitivityError::NoPixels { problem })
 }
 
 /// Checks that every step of the counted episodes has a value; `pixels` counts the steps without one.
-fn check_values<'t>(pixels: &EpisodeTable, counted: impl Iterator<Item = &'t EpisodeTable>) -> Result<(), StudyError> {
+fn check_values<'t>(
+    pixels: &EpisodeTable,
+    counted: impl Iterator<Item = &'t EpisodeTable>,
+) -> Result<(), SensitivityError> {
     let ids: BTreeSet<&str> = counted.flat_map(|table| table.keys.iter().map(|key| key.episode_id)).collect();
     let missing = pixels.metrics.iter().flat_map(|metric| pixels.keys.iter().zip(metric.iter()));
     let missing: Vec<(&str, i64)> = missing
@@ -236,7 +272,7 @@ fn check_values<'t>(pixels: &EpisodeTable, counted: impl Iterator<Item = &'t Epi
     let Some((episode, _)) = missing.first() else { return Ok(()) };
     let steps: i64 = missing.iter().map(|(_, count)| count).sum();
     let steps = format!("{steps} in {} of {} episodes", missing.len(), ids.len());
-    Err(StudyError::PixelsMissing { column: PIXELS, steps, episode: (*episode).to_owned() })
+    Err(SensitivityError::PixelsMissing { steps, episode: (*episode).to_owned() })
 }
 
 #[cfg(test)]

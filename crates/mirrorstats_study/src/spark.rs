@@ -3,14 +3,18 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
+use crate::inputs::InputError;
+use crate::own_definitions::check_scored;
 use crate::question::Question;
-use crate::{Study, StudyError};
+use crate::results::{Outputs, Results};
+use crate::{Study, StudyError, scan};
 use mirrorstats_engines::spark::source::{Sources, is_uri};
 use mirrorstats_engines::spark::{self, Cluster, Job, SparkError, Written};
 use mirrorstats_exact::replace::check_target;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::tables::table::EpisodeTable;
-use mirrorstats_score::vocabulary::check_label;
+use mirrorstats_score::vocabulary::{check_label, unknown_columns};
+use mirrorstats_trace::validate::replies::REPLY_STATUS;
 
 /// A job for Spark, checked as far as possible without Spark.
 #[derive(Debug)]
@@ -45,8 +49,8 @@ impl SparkJob {
     }
 
     pub fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
-        let definitions = question.bind_to(&mirrorstats_score::vocabulary::unknown_columns())?;
-        let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
+        let definitions = question.bind_to(&unknown_columns())?;
+        let (sources, labels, read) = (Sources::uris(uris), question.labels(), Vec::new());
         Ok(Self { sources, definitions, labels, cluster, read })
     }
 
@@ -58,7 +62,6 @@ impl SparkJob {
         Ok(spark::score(self.job(), &self.cluster)?)
     }
 
-    /// Scores on Spark, which writes a folder of Parquet.
     pub fn write(&self, folder: &str) -> Result<Written, StudyError> {
         Ok(spark::write(self.job(), &self.cluster, folder)?)
     }
@@ -68,11 +71,27 @@ impl SparkJob {
     }
 }
 
+/// The episode table, computed by Spark. Lost episodes, which Spark does not know, come from a scan. Errors: as
+/// [`Study::score`]; scores in the place of traces; faults of Spark.
+pub fn score_on(study: &Study, cluster: Cluster) -> Result<EpisodeTable, StudyError> {
+    let traces = study.traces()?;
+    let episodes = SparkJob::of_study(study, cluster)?.score()?;
+    check_scored(&study.question.bind(traces)?, traces, &episodes)?;
+    let mut results = Results::of(episodes);
+    if traces.column(REPLY_STATUS).is_some() {
+        let scanned = scan::scan(traces, &study.question, Outputs::default(), study.threads)?;
+        results = Results { episodes: results.episodes, ..scanned };
+    }
+    study.check_unchanged()?;
+    study.declare(&mut results)?;
+    Ok(results.episodes)
+}
+
 /// Returns true if all arguments are URIs, false if none is.
-pub fn are_uris(arguments: &[OsString]) -> Result<bool, StudyError> {
+pub fn are_uris(arguments: &[OsString]) -> Result<bool, InputError> {
     match arguments.iter().filter(|argument| argument.to_str().is_some_and(is_uri)).count() {
         0 => Ok(false),
         all if all == arguments.len() => Ok(true),
-        _ => Err(StudyError::FilesAndUris),
+        _ => Err(InputError::FilesAndUris),
     }
 }

@@ -1,18 +1,20 @@
-//! Inputs, and the question about them: opened, checked, scanned and grouped.
+//! Inputs, and the question about them: opened, checked, scanned and grouped once.
 
 use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use crate::StudyError;
-use crate::grouped::Grouped;
-use crate::inputs::{Source, Stamp, resolve};
-use crate::losses::Counted;
-use crate::own_definitions::{ScoredAlike, chosen};
-use crate::pooled;
+use crate::caveats::undecided;
+use crate::empty_filter::{self, EmptyFilter};
+use crate::inputs::{self, InputError, Source, Stamp, resolve};
+use crate::limits::check_comparisons;
+use crate::losses::{self, Counted};
+use crate::own_definitions::chosen;
 use crate::question::Question;
 use crate::results::{Outputs, Results};
-use crate::statistics::check_comparisons;
+use crate::{design, pooled, scan, scores};
 use mirrorstats_analysis::plan::register::RegisteredPlan;
 use mirrorstats_exact::replace;
 use mirrorstats_metric::file;
@@ -22,6 +24,7 @@ use mirrorstats_score::cells::group::group;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::vocabulary;
 use mirrorstats_trace::footers::checksums::stale_note;
+use mirrorstats_trace::footers::declared::Declared;
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::read::steps::Steps;
@@ -33,9 +36,17 @@ pub struct Study {
     /// The state of each input before it was opened.
     pub(crate) stamps: Vec<Stamp>,
     pub(crate) source: Source,
-    pub(crate) question: Question,
+    pub question: Question,
     pub(crate) threads: NonZeroUsize,
     pub(crate) plan: Option<RegisteredPlan>,
+}
+
+/// The counted episodes of a study and their cells, from which answers are made.
+#[derive(Debug)]
+pub struct Grouped<'s> {
+    pub(crate) study: &'s Study,
+    pub(crate) counted: Counted,
+    pub(crate) cells: Cells,
 }
 
 impl Study {
@@ -50,7 +61,7 @@ impl Study {
     pub fn of(inputs: Vec<Input>) -> Result<Self, StudyError> {
         let stamps = inputs.iter().map(Stamp::of).collect::<Result<_, _>>()?;
         let source = Source::open(&inputs)?;
-        let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        let threads = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         let mut question = Question::default();
         if let Source::Traces(traces) = &source {
             // Problems with definitions are reported with the answer: the caller may set others first.
@@ -62,7 +73,8 @@ impl Study {
     /// Sets the definitions: `paper`, `extended`, or the path of a TOML file. Errors: a file that cannot be read; every
     /// fault in it.
     pub fn definitions(self, name: impl Into<PathBuf>) -> Result<Self, StudyError> {
-        let question = Question { definitions: Some(name.into()), ..self.question.clone() };
+        let definitions = Some(name.into());
+        let question = Question { definitions, ..self.question.clone() };
         self.asked(question)
     }
 
@@ -123,7 +135,7 @@ impl Study {
 
     /// The traces, for an answer that needs steps. Errors: scores, which have no steps.
     pub fn traces(&self) -> Result<&TraceSet, StudyError> {
-        self.source.traces()
+        Ok(self.source.traces()?)
     }
 
     /// The steps of the episodes that the filter keeps, with these columns in this order; all columns if absent.
@@ -140,7 +152,43 @@ impl Study {
 
     /// The episode table. Errors: faults of the traces or the scores; numbers beyond 64 bits.
     pub fn score(&self) -> Result<Results, StudyError> {
-        self.scan(Outputs { losses: true, ..Outputs::default() })
+        self.scan(Outputs::default())
+    }
+
+    /// Reads the inputs once. A file that changed since it was opened is an error. Errors: faults of the traces or the
+    /// scores; numbers beyond 64 bits; a file that changed in between.
+    pub fn scan(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let (results, inputs) = thread::scope(|scope| {
+            // Hashing reads the same pages; on its own thread it does not slow the scan.
+            let hashing = outputs.hashes.then(|| scope.spawn(|| inputs::hashes(&self.inputs)));
+            let results = match &self.source {
+                Source::Scores(files) => scores::read(files, &self.question).map(Results::of),
+                Source::Traces(traces) => scan::scan(traces, &self.question, outputs, self.threads),
+            };
+            let inputs = hashing.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            (results, inputs)
+        });
+        // A changed file explains any other error.
+        self.check_unchanged()?;
+        let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
+        results.select(outputs);
+        self.declare(&mut results)?;
+        results.quality = results.quality.filter(|_| outputs.quality);
+        Ok(results)
+    }
+
+    /// Adds the declarations of the inputs: design, lost episodes, labels.
+    pub(crate) fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
+        if let Source::Traces(traces) = &self.source {
+            let unrecorded = losses::unrecorded(self, &results.episodes)?;
+            let losses_recorded = results.lost.is_some();
+            results.episodes.declared = Declared { unrecorded, losses_recorded, ..Declared::from_traces(traces) };
+            design::declare(self, traces, &mut results.episodes)?;
+        }
+        let asked = self.question.labels();
+        results.episodes.labels.retain(|label| asked.contains(&label.name) || scan::says_something(label));
+        losses::label(results);
+        Ok(())
     }
 
     /// The cells: exact moments of every metric in every group. Errors: as [`Study::score`]; a column to group by that
@@ -151,7 +199,7 @@ impl Study {
 
     /// The counted episodes and their cells, from a scan. Errors: as [`Study::cells`]; a filter that keeps no episode.
     pub fn grouped(&self) -> Result<Grouped<'_>, StudyError> {
-        self.grouped_with(Outputs { losses: true, copy_candidates: true, ..Outputs::default() })
+        self.grouped_with(Outputs { copy_candidates: true, design: true, ..Outputs::default() })
     }
 
     pub(crate) fn grouped_with(&self, outputs: Outputs) -> Result<Grouped<'_>, StudyError> {
@@ -161,7 +209,8 @@ impl Study {
     }
 
     pub(crate) fn group(&self, counted: Counted) -> Result<Grouped<'_>, StudyError> {
-        let cells = self.cells_of(&counted.results.episodes)?;
+        let mut cells = self.cells_of(&counted.results.episodes)?;
+        cells.add_lost(undecided(self, &counted.lost).iter().map(|(key, _)| key));
         Ok(Grouped { study: self, counted, cells })
     }
 
@@ -176,25 +225,26 @@ impl Study {
         Ok(group(episodes, &by)?)
     }
 
+    /// The explanation of a filter that keeps no episode; `None` if there are episodes or there is no filter. Errors:
+    /// faults of the inputs without the filter.
+    pub fn empty_filter(&self, episodes: usize) -> Result<Option<String>, StudyError> {
+        if episodes > 0 { Ok(None) } else { empty_filter::explained(&self.source, &self.question, self.threads) }
+    }
+
+    pub(crate) fn check_filter(&self, episodes: usize) -> Result<(), StudyError> {
+        self.empty_filter(episodes)?.map_or(Ok(()), |words| Err(EmptyFilter { words }.into()))
+    }
+
     /// A sentence about traces whose checksums belong to another version of the file.
     pub fn stale_checksums(&self) -> Option<String> {
         self.traces().ok().and_then(|traces| stale_note(traces.files()))
-    }
-
-    /// The experiments by their definitions, if each is scored by its own; else empty.
-    pub fn parts(&self) -> &[ScoredAlike] {
-        &self.question.parts
     }
 
     /// The definitions that score all experiments of the traces, named by their footers; `None` for the default ones.
     /// Errors: scores in the place of traces; experiments that need different definitions; definitions in a file of the
     /// recorder's.
     pub fn own_definitions(&self) -> Result<Option<PathBuf>, StudyError> {
-        chosen(self.traces()?)
-    }
-
-    pub fn definitions_name(&self) -> &Path {
-        self.question.definitions_name()
+        Ok(chosen(self.traces()?)?)
     }
 
     /// A note if the definitions are those that the traces carry.
@@ -218,7 +268,7 @@ impl Study {
         Ok(replace::check_folder(out, inputs).map_err(BundleError::from)?)
     }
 
-    pub(crate) fn check_unchanged(&self) -> Result<(), StudyError> {
+    pub(crate) fn check_unchanged(&self) -> Result<(), InputError> {
         self.stamps.iter().try_for_each(Stamp::check)
     }
 }

@@ -5,12 +5,12 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::{self, Metadata};
-use std::path::{Component, Path};
+use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::provenance::{ProvenanceError, kind_of, read};
+use crate::provenance::{ProvenanceError, is_plain, kind_of, read};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::{hash, input};
@@ -99,8 +99,7 @@ fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, ProvenanceError> {
 
 fn fault(output: &Output) -> Option<String> {
     let shown = visible(&output.path);
-    let is_plain = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
-    if !output.path.split('/').all(is_plain) {
+    if !is_plain(&output.path) {
         return Some(format!("the output `{shown}`, which is not a path inside its folder"));
     }
     if output.path == MANIFEST {

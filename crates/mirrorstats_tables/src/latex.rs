@@ -10,6 +10,15 @@ const PACKAGES: &str = "% Needs in the preamble: \\usepackage{booktabs}, \\usepa
 /// The package for the shaded headings of groups.
 const SHADES: &str = ", \\usepackage[table]{xcolor}";
 
+/// Prints the box of the table at its natural width, or at the width of the line if it is wider.
+const SHRINK: &str = "\\ifdim\\wd0>\\linewidth\\resizebox{\\linewidth}{!}{\\usebox0}\\else\\usebox0\\fi\n";
+
+/// The characters that fit one of two columns of a page; wider tables span both.
+const COLUMN_WIDTH: usize = 46;
+
+/// The characters that may fit a page at the natural size. Wider tables are the paper's own form, shrunk to the page.
+const PAGE_WIDTH: usize = 92;
+
 /// Takes characters and their codes. `XeTeX` and `LuaTeX` print the characters; pdfTeX prints the codes, unless the preamble
 /// has its own definition and the packages for the script.
 const UNICODE: &str = "\\providecommand{\\mirrorstatstext}[2]{\\ifdefined\\Umathchar#1\\else#2\\fi}\n";
@@ -35,8 +44,13 @@ impl Table {
         let (shades, blank) = if is_sheet { (SHADES, "\n") } else { ("", "") };
         let columns: String = self.columns.iter().map(|c| if c.align == Align::Left { 'l' } else { 'c' }).collect();
         let header = line(self.columns.iter().map(|column| header(column, is_sheet)));
+        let (environment, open, close) = match self.width() {
+            width if width <= COLUMN_WIDTH => ("table", "\\sbox0", SHRINK),
+            width if width <= PAGE_WIDTH => ("table*", "\\sbox0", SHRINK),
+            _ => ("table*", "\\resizebox{\\textwidth}{!}", ""),
+        };
         let mut text = format!(
-            "\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n{header}"
+            "\\begin{{{environment}}}[t]\n\\centering\n{open}{{%\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n{header}"
         );
         for (at, group) in self.groups.iter().enumerate() {
             if at == 0 || group.heading.is_some() {
@@ -45,13 +59,28 @@ impl Table {
             }
             push_group(&mut text, group, self);
         }
-        let _ = writeln!(text, "{blank}\\bottomrule\n\\end{{tabular}}%\n}}\n\\caption{{{}}}", caption(self));
+        let _ = writeln!(text, "{blank}\\bottomrule\n\\end{{tabular}}%\n}}\n{close}\\caption{{{}}}", caption(self));
         if let Some(label) = &self.label {
             let _ = writeln!(text, "\\label{{{}}}", identifier(label));
         }
-        text.push_str("\\end{table*}\n");
+        let _ = writeln!(text, "\\end{{{environment}}}");
         let command = if text.contains("\\mirrorstatstext{") { UNICODE } else { "" };
         format!("{PACKAGES}{shades}\n{command}{text}")
+    }
+}
+
+impl Table {
+    /// The characters of a line, with two between columns.
+    fn width(&self) -> usize {
+        let cell = |cell: &TableCell| {
+            let detail = cell.detail.as_ref().map_or(0, |detail| 1 + detail.chars().count());
+            cell.text.chars().count() + detail
+        };
+        let column = |(at, column): (usize, &Column)| {
+            let cells = self.rows().filter_map(|row| row.get(at)).map(cell);
+            cells.chain([column.heading.chars().count()]).max().unwrap_or(0) + 2
+        };
+        self.columns.iter().enumerate().map(column).sum()
     }
 }
 

@@ -116,13 +116,8 @@ pub struct FaultRecord {
 impl Faults {
     /// The faults that are all that an error says; `None` for an error that says anything else.
     pub fn of<'e>(error: &'e (dyn Error + 'static)) -> Option<&'e Self> {
-        let mut link = error;
-        let faults: &Self = loop {
-            match link.downcast_ref() {
-                Some(faults) => break faults,
-                None => link = link.source()?,
-            }
-        };
+        let mut links = std::iter::successors(Some(error), |&link| link.source());
+        let faults = links.find_map(|link| link.downcast_ref::<Self>())?;
         (faults.to_string() == error.to_string()).then_some(faults)
     }
 
@@ -137,7 +132,19 @@ impl Faults {
     }
 
     pub fn records(&self) -> Vec<FaultRecord> {
-        self.0.iter().map(FaultRecord::of).collect()
+        let record = |fault: &Fault| {
+            let (source, (line, column)) = (&fault.place.source, fault.line_and_column());
+            FaultRecord {
+                file: source.name.clone(),
+                line,
+                column,
+                text: source.text[within(&source.text, &fault.place.span)].to_owned(),
+                message: fault.message.clone(),
+                label: fault.label.clone(),
+                help: fault.help.clone(),
+            }
+        };
+        self.0.iter().map(record).collect()
     }
 
     #[must_use]
@@ -149,22 +156,6 @@ impl Faults {
         self.0.dedup();
         self.0.truncate(MOST_FAULTS);
         self
-    }
-}
-
-impl FaultRecord {
-    fn of(fault: &Fault) -> Self {
-        let (line, column) = fault.line_and_column();
-        let text = &fault.place.source.text;
-        Self {
-            file: fault.place.source.name.clone(),
-            line,
-            column,
-            text: text[within(text, &fault.place.span)].to_owned(),
-            message: fault.message.clone(),
-            label: fault.label.clone(),
-            help: fault.help.clone(),
-        }
     }
 }
 

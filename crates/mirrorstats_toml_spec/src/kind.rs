@@ -133,23 +133,25 @@ impl<F: FnMut(&At<'_>, &Part, &mut Vec<Fault>)> Reading<'_, F> {
             return;
         }
         let path = folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
-        match self.kind.open(Path::new(name), &path) {
+        let fault = match self.kind.open(Path::new(name), &path) {
             Ok(file) if self.leads_back(&file) => {
                 let names = self.open.iter().map(|(open, _)| open.as_str()).chain([file.source.name.as_str()]);
                 let chain = names.collect::<Vec<_>>().join(" -> ");
-                self.report(Fault::new(place.clone(), format!("the include leads back to itself: {chain}")), faults);
+                Fault::new(place.clone(), format!("the include leads back to itself: {chain}"))
             }
             Ok(file) => {
                 let mut inner = Vec::new();
                 self.file(file, &mut inner);
                 faults.extend(inner.into_iter().next().map(|first| self.concealed(first, place)));
+                return;
             }
             Err(error) => {
                 let help = format!("a path is relative to this file; {}", self.kind.did_you_mean(name));
                 let message = format!("cannot read the {} `{}`: {error}", self.kind.name, path.display());
-                self.report(Fault::new(place.clone(), message).help(help), faults);
+                Fault::new(place.clone(), message).help(help)
             }
-        }
+        };
+        self.report(fault, faults);
     }
 
     fn leads_back(&self, file: &FileText) -> bool {

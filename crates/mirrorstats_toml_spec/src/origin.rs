@@ -67,12 +67,8 @@ fn opening(raw: &str) -> Option<(usize, bool)> {
     let triple = raw.starts_with(&quote.to_string().repeat(3)) && raw.len() >= 6;
     let quotes = if triple { 3 } else { 1 };
     let rest = &raw[quotes..];
-    let dropped = match () {
-        () if triple && rest.starts_with("\r\n") => 2,
-        () if triple && rest.starts_with('\n') => 1,
-        () => 0,
-    };
-    Some((quotes + dropped, quote == '"'))
+    let line_break = ["\r\n", "\n"].into_iter().find(|line_break| triple && rest.starts_with(line_break));
+    Some((quotes + line_break.map_or(0, str::len), quote == '"'))
 }
 
 fn spelling(rest: &str, decoded: char, escapes: bool) -> Option<usize> {
@@ -83,12 +79,13 @@ fn spelling(rest: &str, decoded: char, escapes: bool) -> Option<usize> {
     if !(escapes && first == '\\') {
         return Some(first.len_utf8());
     }
-    Some(match rest.as_bytes().get(1)? {
-        b'x' => 4,
-        b'u' => 6,
-        b'U' => 10,
-        _ => 2,
-    })
+    let digits = match rest.as_bytes().get(1)? {
+        b'x' => 2,
+        b'u' => 4,
+        b'U' => 8,
+        _ => 0,
+    };
+    Some(2 + digits)
 }
 
 fn skip_line_continuations(raw: &str, mut at: usize) -> usize {

@@ -5,15 +5,17 @@
 
 use std::sync::Arc;
 
+use indexmap::IndexSet;
 use schemars::JsonSchema;
-use serde::de::DeserializeOwned;
+use serde::Deserialize as _;
+use serde::de::{DeserializeOwned, IntoDeserializer as _};
 use serde_json::Value as Json;
 use toml::de::DeValue;
-use toml::{Table, Value};
+use toml::{Spanned, Table, Value};
 
 use crate::at::{At, parse};
 use crate::fault::{Fault, Faults, Source};
-use mirrorstats_exact::suggest::nearest;
+use mirrorstats_exact::suggest::{did_you_mean, nearest};
 
 pub struct Shape {
     schema: Json,
@@ -126,10 +128,10 @@ impl<'a> Walk<'a> {
     fn text(&mut self, all: &[&'a Json], at: &At<'_>, text: &str) -> Option<String> {
         let (texts, others): (Vec<&Json>, Vec<&Json>) = all.iter().partition(|one| is_of_type(one, at.value));
         let words: Vec<&str> = texts.iter().flat_map(|one| words(one)).collect();
-        if texts.iter().any(|one| words_of(one).is_none()) || words.contains(&text) {
+        if texts.iter().any(|one| self::words(one).is_empty()) || words.contains(&text) {
             return Some(text.to_owned());
         }
-        let near = nearest(text, words.iter().copied()).map(|near| format!("did you mean `{near}`?"));
+        let near = did_you_mean(text, words.iter().copied());
         let or = if others.is_empty() { String::new() } else { format!(", or {}", self.expected(&others)) };
         let message = format!("`{}` is one of {}{or}; found `{text}`", at.name, words.join(", "));
         self.faults.push(at.fault(message).help_if(near));
@@ -199,7 +201,7 @@ impl<'a> Walk<'a> {
                     None
                 }
                 None if others.is_object() => self.value(others, &value, &one_of(what)),
-                None => Some(as_written(value.value)),
+                None => self.as_written(&value),
             };
             table.extend(read.map(|read| (key.to_owned(), read)));
         }
@@ -215,7 +217,7 @@ impl<'a> Walk<'a> {
                 let fault = Fault::new(at.name_place(), format!("{what} needs `{key}`"));
                 self.faults.push(fault.help(remedy(key, &all)));
             }
-            let is_text = all.iter().all(|one| one["type"] == "string" && words_of(one).is_none());
+            let is_text = all.iter().all(|one| one["type"] == "string" && words(one).is_empty());
             if !is_text {
                 return None;
             }
@@ -224,51 +226,37 @@ impl<'a> Walk<'a> {
         Some(table)
     }
 
+    /// A value of any type.
+    fn as_written(&mut self, at: &At<'_>) -> Option<Value> {
+        let value = Spanned::new(at.place().span, at.value.clone());
+        Value::deserialize(value.into_deserializer()).map_err(|error| self.faults.push(at.fault(error.message()))).ok()
+    }
+
     fn unknown(&mut self, properties: &'a Json, at: &At<'_>, what: &str) -> Option<&'a str> {
         let known: Vec<&str> = properties.as_object().into_iter().flatten().map(|(key, _)| key.as_str()).collect();
         let near = nearest(at.name, known.iter().copied());
-        let help = near.map_or_else(
-            || format!("keys of {what} are {}", known.join(", ")),
-            |near| format!("did you mean `{near}`?"),
-        );
+        let help = match near {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("keys of {what} are {}", known.join(", ")),
+        };
         self.faults.push(Fault::new(at.name_place(), format!("unknown key `{}`", at.name)).help(help));
         near
     }
 
     fn expected(&self, all: &[&'a Json]) -> String {
-        let mut kinds: Vec<String> = Vec::new();
-        for one in all {
-            let kind = match type_names(one).first().copied() {
-                Some("boolean") => "true or false".to_owned(),
-                Some("integer") => "an integer".to_owned(),
-                Some("number") => "a number".to_owned(),
-                Some("object") => "a table".to_owned(),
-                Some("array") => {
-                    let items = self.expected(&self.alternatives(&one["items"]));
-                    format!("a list of {}s", items.rsplit(' ').next().unwrap_or_default())
-                }
-                _ => "a text".to_owned(),
-            };
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
+        let kinds = all.iter().map(|one| match type_names(one).first().copied() {
+            Some("boolean") => "true or false".to_owned(),
+            Some("integer") => "an integer".to_owned(),
+            Some("number") => "a number".to_owned(),
+            Some("object") => "a table".to_owned(),
+            Some("array") => {
+                let items = self.expected(&self.alternatives(&one["items"]));
+                format!("a list of {}s", items.rsplit(' ').next().unwrap_or_default())
             }
-        }
-        kinds.join(" or ")
-    }
-}
-
-fn as_written(value: &DeValue<'_>) -> Value {
-    match value {
-        DeValue::String(text) => Value::String(text.to_string()),
-        DeValue::Boolean(truth) => Value::Boolean(*truth),
-        DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix())
-            .map_or_else(|_| Value::String(number.as_str().to_owned()), Value::Integer),
-        DeValue::Float(number) => Value::Float(number.as_str().replace('_', "").parse().unwrap_or(f64::NAN)),
-        DeValue::Datetime(moment) => Value::Datetime(*moment),
-        DeValue::Array(items) => Value::Array(items.iter().map(|item| as_written(item.get_ref())).collect()),
-        DeValue::Table(table) => {
-            Value::Table(table.iter().map(|(k, v)| (k.get_ref().to_string(), as_written(v.get_ref()))).collect())
-        }
+            _ => "a text".to_owned(),
+        });
+        let kinds: IndexSet<String> = kinds.collect();
+        kinds.into_iter().collect::<Vec<_>>().join(" or ")
     }
 }
 
@@ -281,28 +269,22 @@ fn type_names(schema: &Json) -> Vec<&str> {
 }
 
 fn is_of_type(schema: &Json, value: &DeValue<'_>) -> bool {
-    let names = type_names(schema);
-    let any = |wanted: &[&str]| names.iter().any(|name| wanted.contains(name));
-    match value {
-        DeValue::String(_) => any(&["string"]),
-        DeValue::Boolean(_) => any(&["boolean"]),
-        DeValue::Integer(_) => any(&["integer", "number"]),
-        DeValue::Float(_) => any(&["number"]),
-        DeValue::Array(_) => any(&["array"]),
-        DeValue::Table(_) => any(&["object"]),
-        DeValue::Datetime(_) => false,
-    }
+    let wanted: &[&str] = match value {
+        DeValue::String(_) => &["string"],
+        DeValue::Boolean(_) => &["boolean"],
+        DeValue::Integer(_) => &["integer", "number"],
+        DeValue::Float(_) => &["number"],
+        DeValue::Array(_) => &["array"],
+        DeValue::Table(_) => &["object"],
+        DeValue::Datetime(_) => &[],
+    };
+    type_names(schema).iter().any(|name| wanted.contains(name))
 }
 
-/// The allowed words of a text; `None` if any text is allowed.
-fn words_of(schema: &Json) -> Option<Vec<&str>> {
-    let words = schema["enum"].as_array().map(Vec::as_slice).unwrap_or_default();
-    let words: Vec<&str> = words.iter().chain([&schema["const"]]).filter_map(Json::as_str).collect();
-    (!words.is_empty()).then_some(words)
-}
-
+/// The allowed words of a text; empty if any text is allowed.
 fn words(schema: &Json) -> Vec<&str> {
-    words_of(schema).unwrap_or_default()
+    let words = schema["enum"].as_array().map(Vec::as_slice).unwrap_or_default();
+    words.iter().chain([&schema["const"]]).filter_map(Json::as_str).collect()
 }
 
 fn bounds<T: std::fmt::Display + PartialEq>(least: Option<T>, most: Option<T>, verb: &str) -> Option<String> {

@@ -142,7 +142,6 @@ codes! {
     CopiedEpisode: "copied-episode",
 }
 
-/// The text of a code in `assets/trace/rules.toml`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CodeText {
@@ -184,7 +183,6 @@ impl fmt::Display for Code {
 }
 
 impl Finding {
-    /// A finding about a whole file; the methods below narrow its location.
     pub fn new(code: Code, file: impl Into<String>, expected: impl Into<String>, found: impl Into<String>) -> Self {
         let mut found = found.into();
         // Decoders pass on system messages as text; these do not mean that the file is damaged.
@@ -242,6 +240,13 @@ impl Finding {
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = help.into();
         self
+    }
+}
+
+/// For checks that end with their first finding, among others that report all.
+impl From<Box<Finding>> for Vec<Finding> {
+    fn from(finding: Box<Finding>) -> Self {
+        vec![*finding]
     }
 }
 

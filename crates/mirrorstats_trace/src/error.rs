@@ -3,7 +3,7 @@ use std::path::Path;
 
 use arrow::error::ArrowError;
 
-use super::beside::label_line::LabelsError;
+use super::beside::ListError;
 use super::diagnostic::Finding;
 
 #[derive(Debug, thiserror::Error)]
@@ -15,7 +15,7 @@ pub enum TraceError {
     #[error("`{argument}`: expected {expected}, found {found}; {help}")]
     NoInput { argument: String, expected: &'static str, found: String, help: &'static str },
     #[error(transparent)]
-    Labels(#[from] LabelsError),
+    List(#[from] ListError),
     #[error("cannot take over the episodes of `{file}`: {source}")]
     Part { file: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("cannot start the threads of --threads {threads}; use fewer")]

@@ -1,6 +1,6 @@
 //! The contents of traces: episodes, steps, names, the filled cells of the grid, and the files themselves.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::num::NonZeroUsize;
 
@@ -140,7 +140,6 @@ const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments"
 
 const CELL: usize = 256;
 
-/// Whether to list episodes or only count them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
     Episodes,
@@ -154,7 +153,8 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
     let most = most_listed(bytes);
     // The names of models are compared, counted and printed in full.
     let names = Limit::in_proportion("bytes of models in experiments in files of their size", 24 << 20, 8, bytes);
-    let mut tally = EpisodeTally { files: vec![0; set.files().len()], ..EpisodeTally::default() };
+    let (mut all, mut bytes_of_names) = (Pairs::new(), 0);
+    let mut episodes = vec![0; set.files().len()];
     let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
     let summary = set.scan(
@@ -162,11 +162,20 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         threads,
         |batch| {
             let list = if listing == Listing::Episodes { list(set, &batch) } else { Vec::new() };
-            Ok::<_, TraceError>((Keys::from_batch(&batch), ReplyCounts::of_batch(&batch), list))
+            let count = batch.episodes.num_rows() as u64;
+            Ok::<_, TraceError>((batch.origin.file, count, pairs(&batch), ReplyCounts::of_batch(&batch), list))
         },
-        |(keys, counts, list)| {
-            tally.add(keys);
-            names.check(tally.bytes).map_err(|exceeded| over_budget(set, &exceeded))?;
+        |(file, count, pairs, counts, list)| {
+            episodes[file] += count;
+            for (cell, pairs) in pairs {
+                let bytes = (CELL + cell.0.len() + cell.1.len()) as u64;
+                let known = all.entry(cell).or_insert_with(|| {
+                    bytes_of_names += bytes;
+                    Vec::new()
+                });
+                known.extend(pairs);
+            }
+            names.check(bytes_of_names).map_err(|exceeded| over_budget(set, &exceeded))?;
             if let Some(listed) = &mut listed {
                 listed.extend(list);
                 most.check(listed.len() as u64).map_err(|exceeded| over_budget(set, &exceeded))?;
@@ -178,7 +187,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         },
     )?;
     let mut files = Vec::with_capacity(set.files().len());
-    let jobs: Vec<_> = set.files().iter().zip(std::mem::take(&mut tally.files)).collect();
+    let jobs: Vec<_> = set.files().iter().zip(episodes).collect();
     in_order(
         threads,
         &jobs,
@@ -188,7 +197,8 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
             Ok::<_, TraceError>(())
         },
     )?;
-    let (cells, pairs) = tally.grid();
+    let cells = counted(all);
+    let pairs = distinct(cells.values().flatten().map(|(pair, _)| *pair));
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
     let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
@@ -219,31 +229,6 @@ fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
     values.sort();
     values.dedup();
     values
-}
-
-/// The episodes of a batch, with experiments and models by index into the distinct ones.
-struct Keys {
-    file: usize,
-    cells: Vec<(String, String)>,
-    episodes: Vec<(usize, SeedRun)>,
-}
-
-impl Keys {
-    fn from_batch(batch: &EpisodeBatch) -> Self {
-        let [experiments, models] = ["experiment", "model"].map(|name| texts_of(batch, name));
-        let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
-        // A batch has few cells, so finding one is faster than hashing it.
-        let (mut cells, mut known) = (Vec::new(), BTreeMap::new());
-        let episode = |row: usize| {
-            let cell = *known.entry((experiments.key(row), models.key(row))).or_insert_with(|| {
-                cells.push((text(experiments, row), text(models, row)));
-                cells.len() - 1
-            });
-            (cell, SeedRun { seed: seeds[row], run: runs[row] })
-        };
-        let episodes = (0..batch.episodes.num_rows()).map(episode).collect();
-        Self { file: batch.origin.file, cells, episodes }
-    }
 }
 
 fn column_of<'a>(batch: &'a EpisodeBatch, name: &str) -> &'a ArrayRef {
@@ -279,48 +264,33 @@ fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
     (0..batch.episodes.num_rows()).map(episode).collect()
 }
 
-#[derive(Default)]
-struct EpisodeTally {
-    files: Vec<u64>,
-    bytes: u64,
-    places: HashMap<(String, String), usize>,
-    episodes: Vec<Vec<SeedRun>>,
+type Pairs = BTreeMap<(String, String), Vec<SeedRun>>;
+
+fn pairs(batch: &EpisodeBatch) -> Pairs {
+    let [experiments, models] = ["experiment", "model"].map(|name| texts_of(batch, name));
+    let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
+    // A batch has few cells, but as many episodes as fit: their names are compared by key.
+    let mut by_key: BTreeMap<_, Vec<usize>> = BTreeMap::new();
+    for row in 0..batch.episodes.num_rows() {
+        by_key.entry((experiments.key(row), models.key(row))).or_default().push(row);
+    }
+    let mut found = Pairs::new();
+    for rows in by_key.into_values() {
+        let cell = (text(experiments, rows[0]), text(models, rows[0]));
+        let pair = |row: &usize| SeedRun { seed: seeds[*row], run: runs[*row] };
+        found.entry(cell).or_default().extend(rows.iter().map(pair));
+    }
+    found
 }
 
-/// The number of episodes per seed and run, ascending, for each experiment and model.
 type Cells = BTreeMap<(String, String), Vec<(SeedRun, u64)>>;
 
-impl EpisodeTally {
-    fn add(&mut self, Keys { file, cells, episodes }: Keys) {
-        self.files[file] += episodes.len() as u64;
-        let places: Vec<usize> = cells.into_iter().map(|cell| self.place(cell)).collect();
-        for (cell, pair) in episodes {
-            self.episodes[places[cell]].push(pair);
-        }
-    }
-
-    fn place(&mut self, cell: (String, String)) -> usize {
-        let bytes = (CELL + cell.0.len() + cell.1.len()) as u64;
-        *self.places.entry(cell).or_insert_with(|| {
-            self.bytes += bytes;
-            self.episodes.push(Vec::new());
-            self.episodes.len() - 1
-        })
-    }
-
-    /// The episodes of each cell, and all seeds and runs.
-    fn grid(self) -> (Cells, Vec<SeedRun>) {
-        let Self { places, mut episodes, .. } = self;
-        let mut counted = |place: usize| {
-            let mut pairs = std::mem::take(&mut episodes[place]);
-            pairs.sort_unstable();
-            let same = pairs.chunk_by(|a, b| a == b);
-            same.map(|same| (same[0], same.len() as u64)).collect()
-        };
-        let cells: Cells = places.into_iter().map(|(cell, place)| (cell, counted(place))).collect();
-        let pairs = distinct(cells.values().flatten().map(|(pair, _)| *pair));
-        (cells, pairs)
-    }
+fn counted(pairs: Pairs) -> Cells {
+    let counted = |mut pairs: Vec<SeedRun>| {
+        pairs.sort_unstable();
+        pairs.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u64)).collect()
+    };
+    pairs.into_iter().map(|(cell, pairs)| (cell, counted(pairs))).collect()
 }
 
 fn coverage(cells: &Cells, pairs: &[SeedRun], experiments: &BTreeSet<String>, models: &BTreeSet<String>) -> Vec<Cell> {

@@ -79,14 +79,12 @@ fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
         found: found.to_owned(),
         help,
     };
+    let some =
+        |traces: Vec<PathBuf>, found, help| if traces.is_empty() { Err(no_input(found, help)) } else { Ok(traces) };
     let path = Path::new(argument);
     if path.exists() {
-        return match traces_at(path)? {
-            traces if traces.is_empty() => {
-                Err(no_input("a folder without any *.parquet in it", "name the folder that the recorder wrote to"))
-            }
-            traces => Ok(traces),
-        };
+        let help = "name the folder that the recorder wrote to";
+        return some(traces_at(path)?, "a folder without any *.parquet in it", help);
     }
     // A pattern is text; other bytes can only be a name.
     let Some(pattern) = argument.to_str().filter(|text| is_glob(text)) else {
@@ -99,12 +97,8 @@ fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
         GlobError::Pattern(error) => no_input(error.msg, "correct the glob, or name the files"),
         GlobError::Folder(folder, source) => TraceError::Read { what: folder.display().to_string(), source },
     })?;
-    match matches.iter().map(|path| traces_at(path)).collect::<Result<Vec<_>, _>>()?.concat() {
-        traces if traces.is_empty() => {
-            Err(no_input("a glob that matches no trace", "check the pattern and the current folder"))
-        }
-        traces => Ok(traces),
-    }
+    let traces = matches.iter().map(|path| traces_at(path)).collect::<Result<Vec<_>, _>>()?.concat();
+    some(traces, "a glob that matches no trace", "check the pattern and the current folder")
 }
 
 /// A hundred thousand names take some 20 MB.

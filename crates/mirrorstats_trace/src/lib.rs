@@ -2,13 +2,13 @@
 //!
 //! | folder | contents |
 //! |---|---|
-//! | `schema` | the columns, their allowed values, and their fields in an episode |
+//! | `schema` | the columns, their types, and their allowed values |
 //! | `read` | from bytes to complete episodes: footers, pages, columns, one pass on several threads |
 //! | `write` | from episodes to bytes: new traces, merged traces, sealed copies |
 //! | `validate` | the rules for complete episodes, alone and together |
 //! | `footers` | the declarations of files: clusters, experiments, models, renderers, checksums |
 //! | `beside` | lists beside the traces: labels of coders, lost episodes |
-//! | `episodes` | one episode: steps, hash, frames, colours, answers, attributions |
+//! | `episodes` | one episode in memory: steps, fields, hash, answers, attributions, moments |
 //!
 //! ```
 //! use mirrorstats_trace::inputs::Input;
@@ -27,11 +27,11 @@
 
 pub mod beside;
 pub mod catch_panic;
-pub mod copies;
 pub mod diagnostic;
 pub mod episodes;
 pub mod error;
 pub mod footers;
+pub mod frame;
 mod glob_paths;
 pub mod info;
 pub mod inputs;

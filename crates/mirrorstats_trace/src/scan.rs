@@ -8,26 +8,27 @@ use std::num::NonZeroUsize;
 use std::ops::Range;
 use std::sync::Arc;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch, RecordBatchOptions, StringArray, UInt8Array};
+use arrow::array::{
+    Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch, RecordBatchOptions, StringArray, UInt8Array,
+};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Schema};
 use arrow::error::ArrowError;
 
+use super::beside::labels::Labels;
 use super::error::TraceError;
 use super::read::open::TraceSet;
 use super::read::parallel_scan::{Episodes, ScanEvent, pass};
-use super::read::prints;
 use super::read::projection::Layout;
+use super::read::row_hashes;
 use super::schema::DeclaredColumn;
 use super::validate::color_set::{Spellings, other_names};
-use super::validate::duplicate_ids::{Prints, hashes};
+use super::validate::duplicate_ids::{IdHashes, hashes};
 use super::validate::episode_hashes;
 use super::validate::rules::Rules;
 
-/// The columns of a scan, and its checks beyond the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Projection {
-    /// Columns with one value per step.
     pub steps: Vec<String>,
     /// Columns with one value per step, taken unchanged: the schema's rules about values do not apply.
     pub unchecked: Vec<String>,
@@ -37,8 +38,7 @@ pub struct Projection {
     pub declared: Vec<DeclaredColumn>,
     /// The known experiments; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
-    /// True to compute [`EpisodeBatch::prints`].
-    pub prints: bool,
+    pub row_hashes: bool,
     /// True to leave the timesteps unread and unchecked.
     pub without_t: bool,
 }
@@ -69,7 +69,7 @@ pub struct EpisodeBatch {
     pub episodes: RecordBatch,
     pub origin: RowOrigin,
     /// One number per episode, if asked for: equal for equal rows in the columns read, without the id.
-    pub prints: Option<Vec<u64>>,
+    pub row_hashes: Option<Vec<u64>>,
 }
 
 /// A column of steps with few distinct texts, one byte per row.
@@ -129,15 +129,15 @@ impl TraceSet {
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
         let shape = Shape {
             layout: &layout,
+            labels: (self.labels(), labels),
             steps: projection.step_columns().filter_map(|name| layout.position(name)).collect(),
             episodes: read().filter_map(|name| layout.position(name)).collect(),
         };
         let whole = |episodes: Episodes| -> Result<EpisodeBatch, TraceError> {
-            let prints = projection.prints.then(|| prints::of_episodes(&layout, &episodes));
-            let batch = shape.batch(episodes)?;
-            Ok(EpisodeBatch { episodes: self.with_label_columns(batch.episodes, &labels)?, prints, ..batch })
+            let row_hashes = projection.row_hashes.then(|| row_hashes::of_episodes(&layout, &episodes));
+            Ok(EpisodeBatch { row_hashes, ..shape.batch(episodes)? })
         };
-        let mut prints = Prints::default();
+        let mut id_hashes = IdHashes::default();
         let mut spellings = Spellings::new(self.files());
         let mut summary = ScanSummary::default();
         let checked = |episodes: Episodes| {
@@ -159,14 +159,14 @@ impl TraceSet {
                 ScanEvent::Whole(checked) => checked,
                 ScanEvent::Fault(finding) => return Err(TraceError::from(finding).into()),
             };
-            prints.add(&ids);
+            id_hashes.add(&ids);
             spellings.add(colors);
             summary.episodes += episodes;
             summary.steps += steps;
             sink(result?)
         });
         // A repeated id is found only at the end, though it precedes the event that ended the pass.
-        prints.check(self.files(), &layout)?;
+        id_hashes.check(self.files(), &layout)?;
         passed?;
         // Two spellings of one colour are found only when all names are known.
         spellings.check(self.files(), &layout, threads)?;
@@ -203,6 +203,7 @@ pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMa
 
 struct Shape<'a> {
     layout: &'a Layout,
+    labels: (&'a Labels, Vec<&'a str>),
     steps: Vec<usize>,
     episodes: Vec<usize>,
 }
@@ -221,28 +222,35 @@ impl Shape<'_> {
                 None => others.push(place),
             }
         }
-        let steps = self.part(&others, rows, |place| episodes.columns[place].flat())?;
-        let constants = self.part(&self.episodes, episodes.len(), |place| episodes.columns[place].at(firsts))?;
+        let steps = batch(self.columns(&others, |place| episodes.columns[place].flat())?, rows)?;
+        let mut constants = self.columns(&self.episodes, |place| episodes.columns[place].at(firsts))?;
+        let (labels, names) = &self.labels;
+        for name in names {
+            let values: BooleanArray = episodes.ids(firsts).map(|id| labels.value(name, id?)).collect();
+            constants.push((Field::new(*name, DataType::Boolean, true), Arc::new(values)));
+        }
+        let constants = batch(constants, episodes.len())?;
         let first = episodes.pieces[0];
         let origin = RowOrigin { file: episodes.file, row_group: first.row_group, row: first.row };
-        Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin, prints: None })
+        Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin, row_hashes: None })
     }
 
-    fn part(
+    fn columns(
         &self,
         places: &[usize],
-        rows: usize,
         values: impl Fn(usize) -> Result<ArrayRef, ArrowError>,
-    ) -> Result<RecordBatch, TraceError> {
-        let values = places.iter().map(|place| values(*place)).collect::<Result<Vec<_>, _>>();
-        let values = values.map_err(TraceError::Memory)?;
-        let field = |(place, values): (&usize, &ArrayRef)| {
-            let column = &self.layout.columns[*place];
+    ) -> Result<Vec<(Field, ArrayRef)>, TraceError> {
+        let column = |place: &usize| {
+            let (column, values) = (&self.layout.columns[*place], values(*place).map_err(TraceError::Memory)?);
             let nullable = column.known.is_none_or(|known| known.nullable);
-            Field::new(&column.name, values.data_type().clone(), nullable)
+            Ok((Field::new(&column.name, values.data_type().clone(), nullable), values))
         };
-        let schema = Schema::new(places.iter().zip(&values).map(field).collect::<Vec<_>>());
-        let options = RecordBatchOptions::new().with_row_count(Some(rows));
-        RecordBatch::try_new_with_options(Arc::new(schema), values, &options).map_err(TraceError::Memory)
+        places.iter().map(column).collect()
     }
+}
+
+fn batch(columns: Vec<(Field, ArrayRef)>, rows: usize) -> Result<RecordBatch, TraceError> {
+    let (fields, values): (Vec<Field>, Vec<ArrayRef>) = columns.into_iter().unzip();
+    let options = RecordBatchOptions::new().with_row_count(Some(rows));
+    RecordBatch::try_new_with_options(Arc::new(Schema::new(fields)), values, &options).map_err(TraceError::Memory)
 }

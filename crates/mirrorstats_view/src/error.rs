@@ -8,7 +8,7 @@ use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_log::LogError;
 use mirrorstats_study::StudyError;
 use mirrorstats_toml_spec::Faults;
-use mirrorstats_trace::beside::label_line::LabelsError;
+use mirrorstats_trace::beside::ListError;
 use mirrorstats_trace::error::TraceError;
 
 /// A folder of copies, and the folder of their originals.
@@ -22,7 +22,7 @@ pub enum ViewError {
     #[error(transparent)]
     Trace(#[from] TraceError),
     #[error(transparent)]
-    Labels(#[from] LabelsError),
+    Labels(#[from] ListError),
     #[error(transparent)]
     Log(#[from] LogError),
     #[error("cannot list the folder `{}`: {source}", visible(&folder.to_string_lossy()))]

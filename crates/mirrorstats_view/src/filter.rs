@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 use super::{Snapshot, ViewError};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_score::cells::group::CONDITION;
+use mirrorstats_score::tables::table::CONDITION;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_study::results::Results;
 use mirrorstats_trace::beside::labels;
@@ -165,7 +165,7 @@ pub(super) fn values_of<'t>(
         "run" => Box::new(|row| Some(table.keys.get(row).run.to_string())),
         PARTICIPANT => Box::new(|row| table.label(PARTICIPANT)?.get(row).map(str::to_owned)),
         name => match table.metric(name) {
-            Some(metric) => Box::new(|row| metric.get(row).map(|value| value.to_string())),
+            Some(metric) => Box::new(|row| table.decimal(metric, row).map(|value| value.to_string())),
             None if name.starts_with(labels::PREFIX) && table.label(name).is_some() => {
                 Box::new(|row| table.label(name)?.get(row).map(str::to_owned))
             }

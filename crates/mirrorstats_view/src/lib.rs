@@ -36,6 +36,7 @@ mod filter;
 mod found;
 mod logs;
 mod page;
+mod recent;
 #[cfg(feature = "sim")]
 mod rendered;
 pub mod routes;

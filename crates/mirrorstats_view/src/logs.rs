@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use super::recent::Recent;
 use mirrorstats_log::LogError;
 use mirrorstats_log::frames::{self, LogIndex, Moment, SceneShape};
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::write::merge::OwnColumn;
+use mirrorstats_trace::read::episode_rows::OwnColumn;
 
 /// The number of log indices in memory.
 const KEPT_INDICES: usize = 64;
@@ -41,13 +42,13 @@ impl Opened {
 #[derive(Debug)]
 pub(super) struct Logs {
     pub paths: Vec<PathBuf>,
-    indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
+    indices: Recent<PathBuf, Option<LogIndex>>,
     reading: Mutex<()>,
 }
 
 impl Logs {
     pub fn new(paths: Vec<PathBuf>) -> Self {
-        Self { paths, indices: Mutex::default(), reading: Mutex::default() }
+        Self { paths, indices: Recent::new(KEPT_INDICES), reading: Mutex::default() }
     }
 
     /// The log's record of a step.
@@ -83,7 +84,8 @@ impl Logs {
             return frames::each_unfinished_moment(log, times, give);
         }
         for log in self.of(opened) {
-            let Some(index) = self.index(log)? else { continue };
+            let index = self.index(log)?;
+            let Some(index) = index.as_ref() else { continue };
             if index.each_moment(&opened.episode.episode_id, times, give)? {
                 break;
             }
@@ -99,19 +101,10 @@ impl Logs {
     }
 
     /// The index of a log, read once; `None` if it has no index or is not the log of a recording.
-    fn index(&self, log: &Path) -> Result<Option<Arc<LogIndex>>, LogError> {
-        let mut indices = self.indices.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(index) = indices.get(log) {
-            return Ok(index.clone());
-        }
-        if indices.len() >= KEPT_INDICES {
-            indices.clear();
-        }
-        let index = match LogIndex::open(log) {
-            Err(LogError::Foreign { .. }) => None,
-            opened => opened?.map(Arc::new),
-        };
-        indices.insert(log.to_owned(), index.clone());
-        Ok(index)
+    fn index(&self, log: &Path) -> Result<Arc<Option<LogIndex>>, LogError> {
+        self.indices.get(log.to_owned(), || match LogIndex::open(log) {
+            Err(LogError::Foreign { .. }) => Ok(None),
+            opened => opened,
+        })
     }
 }

@@ -1,11 +1,11 @@
 //! Frames of episodes without a log, rendered again by a replay in blocks of steps; recent blocks are kept.
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 
 use super::ViewError;
+use super::recent::Recent;
 use mirrorstats_record::replay::frames::frames;
 use mirrorstats_trace::episodes::episode::Episode;
 
@@ -15,10 +15,15 @@ const TOGETHER: usize = 16;
 /// The number of blocks in memory, a few megabytes.
 const KEPT: usize = 16;
 
-type Block = BTreeMap<i32, Vec<u8>>;
+/// Blocks of frames as PNG by step, by episode and place of the block.
+#[derive(Debug)]
+pub(super) struct Rendered(Recent<(String, usize), BTreeMap<i32, Vec<u8>>>);
 
-#[derive(Debug, Default)]
-pub(super) struct Rendered(Mutex<BTreeMap<(String, usize), Block>>);
+impl Default for Rendered {
+    fn default() -> Self {
+        Self(Recent::new(KEPT))
+    }
+}
 
 impl Rendered {
     /// The frame of a step; `None` if the episode has no such step. Replays run one at a time: a concurrent caller
@@ -27,18 +32,10 @@ impl Rendered {
         let Some(block) = t.checked_sub(1).filter(|at| *at < episode.steps.len()).map(|at| at / TOGETHER) else {
             return Ok(None);
         };
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let step = |t: usize| i32::try_from(t).unwrap_or(i32::MAX);
+        let steps = step(block * TOGETHER + 1)..=step((block + 1) * TOGETHER);
         let key = (episode.episode_id.clone(), block);
-        if !kept.contains_key(&key) {
-            let first = i32::try_from(block * TOGETHER + 1).unwrap_or(i32::MAX);
-            let last = i32::try_from((block + 1) * TOGETHER).unwrap_or(i32::MAX);
-            let rendered = frames(recording, episode, &(first..=last)).map_err(Box::new)?;
-            if kept.len() >= KEPT {
-                kept.clear();
-            }
-            kept.insert(key.clone(), rendered);
-        }
-        let frames = kept.get(&key);
-        Ok(i32::try_from(t).ok().and_then(|t| frames?.get(&t).cloned()))
+        let frames = self.0.get(key, || frames(recording, episode, &steps)).map_err(Box::new)?;
+        Ok(frames.get(&step(t)).cloned())
     }
 }

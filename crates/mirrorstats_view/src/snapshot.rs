@@ -1,27 +1,32 @@
 //! The state of recordings at one time: their episodes, scores and locations.
 
-use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::ErrorKind;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::found::{Found, Stamp};
 use super::logs::{Logs, Opened};
+use super::recent::Recent;
 use super::{Options, ViewError};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_log::LogError;
 use mirrorstats_log::frames;
 use mirrorstats_score::tables::select::{SelectError, select};
+use mirrorstats_study::labels::{reads_labels, relabelled};
 use mirrorstats_study::question::Question;
 use mirrorstats_study::results::{Outputs, Results};
 use mirrorstats_study::{Study, StudyError};
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows::{self, EpisodeRows};
 use mirrorstats_trace::read::search;
 use mirrorstats_trace::scan::{EpisodePlace, episode_places};
 use mirrorstats_trace::schema::Domain;
-use mirrorstats_trace::write::merge::{self, EpisodeRows};
+
+/// The number of conditions, and of searches, whose answers are kept: each took a scan.
+const MOST_ANSWERS: usize = 4;
 
 /// Recordings as of the time they were read.
 #[derive(Debug)]
@@ -38,8 +43,8 @@ pub(super) struct Snapshot {
     pub stamps: Vec<Stamp>,
     pub label_stamps: Vec<Stamp>,
     pub logs: Logs,
-    kept: Recent<HashSet<String>>,
-    said: Recent<BTreeMap<String, search::Found>>,
+    kept: Recent<String, HashSet<String>>,
+    said: Recent<String, BTreeMap<String, search::Found>>,
     #[cfg(feature = "sim")]
     rendered: Arc<super::rendered::Rendered>,
 }
@@ -108,8 +113,8 @@ impl Snapshot {
             stamps,
             label_stamps,
             logs: Logs::new(found.logs.clone()),
-            kept: Recent::default(),
-            said: Recent::default(),
+            kept: Recent::new(MOST_ANSWERS),
+            said: Recent::new(MOST_ANSWERS),
             #[cfg(feature = "sim")]
             rendered: Arc::default(),
         }
@@ -118,7 +123,7 @@ impl Snapshot {
     /// A copy with the current labels. Scores that depend on labels are computed again.
     pub fn relabelled(&self, found: &Found) -> Result<Self, ViewError> {
         match &self.scored {
-            Some(scored) if !scored.study.reads_labels()? => {
+            Some(scored) if !reads_labels(&scored.study)? => {
                 let scored = Arc::new(scored.relabelled(&self.options)?);
                 Ok(Self { label_stamps: found.label_stamps(), ..self.grown(found, Some(scored)) })
             }
@@ -212,7 +217,7 @@ impl Snapshot {
     /// Reads a group of episodes, in trace order.
     pub fn open_together(&self, some: &Together) -> Result<Vec<Opened>, ViewError> {
         let is_mirror = self.table()?.study.traces()?.domain() == Domain::Mirror;
-        let rows = merge::read_rows(&some.input, some.rows.clone())?;
+        let rows = episode_rows::read_rows(&some.input, some.rows.clone())?;
         if !rows.iter().map(|rows| &rows.episode_id).eq(some.episodes.iter().map(|(_, id)| id)) {
             return Err(replaced(&some.input));
         }
@@ -224,7 +229,7 @@ impl Snapshot {
             && let Some(place) = scored.places.get(id)
         {
             let input = &scored.inputs[place.file];
-            let rows = merge::read_rows(input, place.rows.clone())?;
+            let rows = episode_rows::read_rows(input, place.rows.clone())?;
             let own = rows.iter().find(|rows| rows.episode_id == id).ok_or_else(|| replaced(input))?;
             return opened(own, input, scored.study.traces()?.domain() == Domain::Mirror);
         }
@@ -247,6 +252,22 @@ impl Snapshot {
         Ok(None)
     }
 
+    /// Passes the shapes of each step with its t: from a log, or from a replay if no log has them and this build can.
+    pub fn each_shapes(
+        &self,
+        opened: &Opened,
+        give: &mut dyn FnMut(usize, &[frames::SceneShape]),
+    ) -> Result<(), ViewError> {
+        #[cfg(feature = "sim")]
+        if self.renders(opened) && self.logs.moment(opened, 1)?.is_none() {
+            let mut give = |t, solids: &[_]| give(t, &frames::of_solids(solids));
+            let recording = self.recording(opened);
+            let shown = mirrorstats_record::replay::frames::shapes(recording.as_ref(), &opened.episode, &mut give);
+            return Ok(shown.map_err(Box::new)?);
+        }
+        Ok(self.logs.each_shapes(opened, &mut |t, shapes| give(t, &shapes))?)
+    }
+
     /// Returns true if an episode's frames can be rendered again: the trace has its world, and this build has worlds.
     pub fn renders(&self, opened: &Opened) -> bool {
         let is_whole = self.scored.is_some() && opened.running.is_none();
@@ -257,8 +278,7 @@ impl Snapshot {
         is_whole && has_world
     }
 
-    #[cfg(feature = "sim")]
-    fn recording(&self, opened: &Opened) -> Option<serde_json::Value> {
+    pub fn recording(&self, opened: &Opened) -> Option<serde_json::Value> {
         let scored = self.scored.as_ref()?;
         let place = scored.places.get(&opened.episode.episode_id)?;
         let file = scored.study.traces().ok()?.files().get(place.file)?;
@@ -280,13 +300,13 @@ impl Snapshot {
             };
             Ok(table.keys.iter().map(|key| key.episode_id.to_owned()).collect())
         };
-        self.kept.get(condition, found)
+        self.kept.get(condition.to_owned(), found)
     }
 
     /// The episodes whose texts contain these words.
     pub fn said(&self, words: &str) -> Result<Arc<BTreeMap<String, search::Found>>, ViewError> {
         let scored = self.table()?;
-        self.said.get(words, || Ok(search::search(scored.study.traces()?, words, self.options.threads)?))
+        self.said.get(words.to_owned(), || Ok(search::search(scored.study.traces()?, words, self.options.threads)?))
     }
 }
 
@@ -294,7 +314,7 @@ impl Scored {
     fn of(options: &Options, inputs: Vec<Input>) -> Result<Self, ViewError> {
         let study = Self::study(options, inputs.clone(), options.question.clone())?;
         let places = episode_places(study.traces()?, options.threads)?;
-        let outputs = Outputs { losses: true, quality: true, copy_candidates: true, ..Outputs::default() };
+        let outputs = Outputs { quality: true, copy_candidates: true, ..Outputs::default() };
         let results = study.scan(outputs)?;
         let rows = results.episodes.keys.iter().enumerate().map(|(at, key)| (key.episode_id.to_owned(), at)).collect();
         Ok(Self { study, results, rows, inputs, places })
@@ -309,7 +329,7 @@ impl Scored {
     /// A copy with the current labels.
     fn relabelled(&self, options: &Options) -> Result<Self, ViewError> {
         let study = Self::study(options, self.inputs.clone(), options.question.clone())?;
-        let results = study.relabelled(self.results.clone())?;
+        let results = relabelled(&study, self.results.clone())?;
         let (rows, inputs, places) = (self.rows.clone(), self.inputs.clone(), self.places.clone());
         Ok(Self { study, results, rows, inputs, places })
     }
@@ -352,30 +372,4 @@ fn running(found: &Found, scored: Option<&Scored>) -> (Vec<Running>, Vec<String>
     running.sort_by(|a, b| a.episode.episode_id.cmp(&b.episode.episode_id));
     running.dedup_by(|a, b| a.episode.episode_id == b.episode.episode_id);
     (running, unreadable)
-}
-
-/// Recent answers by question, for answers that took a scan.
-#[derive(Debug)]
-struct Recent<T>(Mutex<VecDeque<(String, Arc<T>)>>);
-
-impl<T> Default for Recent<T> {
-    fn default() -> Self {
-        Self(Mutex::default())
-    }
-}
-
-impl<T> Recent<T> {
-    const MOST: usize = 4;
-
-    /// Returns a recent answer, or finds it. Concurrent callers wait.
-    fn get(&self, question: &str, find: impl FnOnce() -> Result<T, ViewError>) -> Result<Arc<T>, ViewError> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, answer)) = kept.iter().find(|(asked, _)| asked == question) {
-            return Ok(Arc::clone(answer));
-        }
-        let answer = Arc::new(find()?);
-        kept.truncate(Self::MOST - 1);
-        kept.push_front((question.to_owned(), Arc::clone(&answer)));
-        Ok(answer)
-    }
 }

@@ -7,21 +7,18 @@ use base64::engine::general_purpose::STANDARD;
 
 use super::journal::{Journal, JournalError, Recorded};
 use super::limits::Begun;
-use super::model::{Memory, Vlm};
+use super::model::Vlm;
 use super::step::Step;
 use super::wire_format::ModelAnswer;
 use mirrorstats_agents::prompt::Prompt;
 use mirrorstats_agents::reply;
-use mirrorstats_agents::{Agent, Decision, Lost, Observation, Reply, Task, Usage, locked};
+use mirrorstats_agents::{Agent, Decision, Lost, Observation, Reply, Status, Task, Usage, locked};
 use mirrorstats_exact::hash;
 
 impl Vlm {
     pub fn agent(self: &Arc<Self>, task: Task, episode: &str) -> Result<VlmAgent, JournalError> {
-        let path = self.memory.path(episode);
-        let journal = match self.memory {
-            Memory::Journals(_) => Journal::open(&path)?,
-            Memory::Cassette(_) => Journal::cassette(&path)?,
-        };
+        let path = self.path(episode);
+        let journal = if self.online.is_some() { Journal::open(&path)? } else { Journal::cassette(&path)? };
         Ok(VlmAgent { vlm: Arc::clone(self), task, journal: Arc::new(Mutex::new(journal)), begun: None })
     }
 }
@@ -53,22 +50,18 @@ impl VlmAgent {
         if let Some(recorded) = recorded {
             return self.reply_to(observation.t, &question, &recorded);
         }
-        let (Some(network), Some(_)) = (&self.vlm.network, &self.vlm.provider) else {
+        let Some((_, network)) = &self.vlm.online else {
             return Err(Lost::because(format!("the cassette has no answer for step {}", observation.t)));
         };
         let frame = &observation.frame;
         let view = [frame.width, frame.height].map(|pixels| u32::try_from(pixels).unwrap_or(u32::MAX));
         let at_most = self.vlm.at_most(without_frame.len(), view);
-        let png = observation
-            .frame
-            .to_png()
-            .map_err(|fault| Lost::because(format!("the frame cannot be encoded: {fault}")))?;
-        let frame = hash::of_bytes(png);
+        let png = frame.to_png().map_err(|fault| Lost::because(format!("the frame cannot be encoded: {fault}")))?;
         let step = Step {
             vlm: Arc::clone(&self.vlm),
             journal: Arc::clone(&self.journal),
             t: observation.t,
-            frame,
+            frame: hash::of_bytes(png),
             body: self.vlm.choice.body(&words, &schema, &STANDARD.encode(png)),
             question,
             at_most,
@@ -118,7 +111,10 @@ impl VlmAgent {
             completion_tokens: count(answer.completion_tokens),
             cost_usd: self.vlm.choice.cost_usd(&answer),
         };
-        let reply = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
+        let mut reply = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
+        if answer.is_reasoning_alone && reply.status == Status::Empty {
+            reply.fault = Some(reply::REASONING_ALONE.to_owned());
+        }
         Reply { model: answer.model, ..reply.with_text(answer.text, usage) }
     }
 }

@@ -1,17 +1,13 @@
 //! A model's journals in a folder: answers, costs, and averages of finished episodes.
 
-use std::path::Path;
-
 use super::journal::{Journal, JournalError};
-use super::model::{Memory, Vlm, tokens};
+use super::model::{Vlm, tokens};
 use crate::limits::Spend;
 
 /// The average answer of finished episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Typical {
-    /// Finished episodes with a journal.
     pub episodes: u64,
-    /// Answers per episode.
     pub steps: f64,
     /// US dollars per answer; `None` if no answer has a cost or a price.
     pub cost_usd: Option<f64>,
@@ -22,9 +18,8 @@ pub struct Typical {
 }
 
 impl Vlm {
-    /// The number of an episode's steps that already have an answer.
     pub fn answered(&self, episode: &str) -> Result<u64, JournalError> {
-        match Journal::cassette(&self.memory.path(episode)) {
+        match Journal::cassette(&self.path(episode)) {
             Ok(journal) => Ok(journal.answers().count() as u64),
             Err(JournalError::Missing { .. }) => Ok(0),
             Err(error) => Err(error),
@@ -33,21 +28,20 @@ impl Vlm {
 
     /// Adds the spending of earlier starts on the model, from its journals. `slug` is the model's name in episode names.
     pub fn count_spent(&self, slug: &str) -> Result<(), JournalError> {
-        let Memory::Journals(folder) = &self.memory else { return Ok(()) };
-        self.account.begin_with(spent(self, folder, slug)?);
+        if self.online.is_some() {
+            self.account.begin_with(spent(self, slug)?);
+        }
         Ok(())
     }
 
     /// Reads the journals of these finished episodes; `None` if no journal exists.
     pub fn typical<'a>(&self, episodes: impl Iterator<Item = &'a str>) -> Result<Option<Typical>, JournalError> {
-        let (mut count, mut steps, mut seconds) = (0, Vec::new(), Vec::new());
-        let (mut costs, mut tokens) = (Vec::new(), Vec::new());
+        let (mut steps, mut seconds, mut costs, mut tokens) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for episode in episodes {
-            let journal = match Journal::cassette(&self.memory.path(episode)) {
+            let journal = match Journal::cassette(&self.path(episode)) {
                 Err(JournalError::Missing { .. }) => continue,
                 journal => journal?,
             };
-            count += 1;
             steps.push(f64::from(u32::try_from(journal.answers().count()).unwrap_or(u32::MAX)));
             for recorded in journal.answers() {
                 seconds.push(f64::from(recorded.latency_ms) / 1e3);
@@ -56,34 +50,29 @@ impl Vlm {
                 tokens.extend(answer.completion_tokens.map(f64::from));
             }
         }
-        let [steps, cost_usd, completion_tokens, seconds] = [&steps, &costs, &tokens, &seconds].map(|all| mean(all));
-        Ok(steps.zip(seconds).map(|(steps, seconds)| Typical {
-            episodes: count,
-            steps,
-            cost_usd,
-            completion_tokens,
-            seconds,
-        }))
+        let episodes = steps.len() as u64;
+        let (cost_usd, completion_tokens) = (mean(&costs), mean(&tokens));
+        let of_steps = mean(&steps).zip(mean(&seconds));
+        Ok(of_steps.map(|(steps, seconds)| Typical { episodes, steps, cost_usd, completion_tokens, seconds }))
     }
 }
 
 /// The spending on this model according to its journals, for the account of a restarted run. `slug` is its name in
 /// episode names; other models' journals in the folder have other prices and limits.
-fn spent(vlm: &Vlm, folder: &Path, slug: &str) -> Result<Spend, JournalError> {
+fn spent(vlm: &Vlm, slug: &str) -> Result<Spend, JournalError> {
     let mut spend = Spend::default();
-    let entries = match std::fs::read_dir(folder) {
-        Ok(entries) => entries,
+    let failed = |source| JournalError::Io { path: vlm.folder.clone(), source };
+    let entries = match std::fs::read_dir(&vlm.folder) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(spend),
-        Err(source) => return Err(JournalError::Io { path: folder.to_owned(), source }),
+        entries => entries.map_err(failed)?,
     };
     for entry in entries {
-        let path = entry.map_err(|source| JournalError::Io { path: folder.to_owned(), source })?.path();
+        let path = entry.map_err(failed)?.path();
         let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
         if path.extension().is_none_or(|ending| ending != "jsonl") || model_of(stem) != Some(slug) {
             continue;
         }
-        let journal = Journal::cassette(&path)?;
-        add_journal(vlm, &journal, &mut spend);
+        add_journal(vlm, &Journal::cassette(&path)?, &mut spend);
     }
     Ok(spend)
 }
@@ -94,19 +83,17 @@ fn mean(values: &[f64]) -> Option<f64> {
 }
 
 fn add_journal(vlm: &Vlm, journal: &Journal, spend: &mut Spend) {
-    let usd = |at_most: Option<[u64; 2]>| at_most.and_then(|tokens| vlm.cost_of(tokens)).unwrap_or(0.0);
+    let usd = |at_most| vlm.cost_of(at_most).unwrap_or(0.0);
     let requests = journal.requests();
     spend.requests += requests.sent;
-    for at_most in requests.unanswered {
-        spend.add_unanswered(usd(at_most));
-    }
+    requests.unanswered.into_iter().for_each(|at_most| spend.add_unanswered(usd(at_most)));
     for recorded in journal.answers() {
         let answer = vlm.read(&recorded.body);
         if let Some(answer) = &answer {
             vlm.learn_from(answer);
         }
         let cost = answer.as_ref().and_then(|answer| vlm.choice.cost_usd(answer));
-        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(recorded.at_most));
+        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, recorded.at_most.map_or(0.0, usd));
     }
 }
 

@@ -10,7 +10,7 @@ use mirrorstats_agents::prompt::Prompt;
 use mirrorstats_agents::{Observation, Past, Task, reply};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 
 /// Characters per token of English words.
 const CHARACTERS: u64 = 4;
@@ -25,7 +25,6 @@ pub fn prompt_tokens(choice: &Choice, experiment: &Experiment, view: [u32; 2]) -
     Ok(characters.div_ceil(CHARACTERS) + frame_tokens(choice.backend.wire_format, view))
 }
 
-/// The tokens of a frame of this width and height.
 pub(crate) fn frame_tokens(wire_format: WireFormat, [width, height]: [u32; 2]) -> u64 {
     let (width, height) = (u64::from(width), u64::from(height));
     match wire_format {

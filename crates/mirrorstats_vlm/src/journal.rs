@@ -27,7 +27,6 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of a journal", 32 << 20)
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Entry {
-    /// A request about to be sent.
     Request {
         t: i32,
         attempt: u32,
@@ -36,8 +35,7 @@ pub enum Entry {
         /// SHA-256 of the frame as PNG.
         frame: String,
         /// The maximum tokens of the request and of its reply.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        at_most: Option<[u64; 2]>,
+        at_most: [u64; 2],
     },
     /// An answer in the provider's wire format.
     Answer {
@@ -51,7 +49,6 @@ pub enum Entry {
         model: Option<String>,
         body: String,
     },
-    /// An attempt without an answer.
     Failure {
         t: i32,
         attempt: u32,
@@ -64,36 +61,28 @@ pub enum Entry {
     },
 }
 
-/// The answer to a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorded {
     pub question: String,
     pub latency_ms: i32,
     pub body: String,
+    /// `None` without its request.
     pub at_most: Option<[u64; 2]>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
     pub sent: u64,
-    /// Unanswered requests that may have been billed, with their maximum tokens if known.
-    pub unanswered: Vec<Option<[u64; 2]>>,
-    is_open: bool,
-    at_most: Option<[u64; 2]>,
+    /// The maximum tokens of unanswered requests that may have been billed.
+    pub unanswered: Vec<[u64; 2]>,
+    open: Option<[u64; 2]>,
 }
 
 impl Requests {
-    fn note_sent(&mut self, at_most: Option<[u64; 2]>) {
-        self.note_outcome(true);
-        self.sent += 1;
-        (self.is_open, self.at_most) = (true, at_most);
-    }
-
-    fn note_outcome(&mut self, may_be_paid: bool) {
-        if self.is_open && may_be_paid {
-            self.unanswered.push(self.at_most);
-        }
-        self.is_open = false;
+    fn close(&mut self, may_be_paid: bool) -> Option<[u64; 2]> {
+        let open = self.open.take();
+        self.unanswered.extend(open.filter(|_| may_be_paid));
+        open
     }
 }
 
@@ -152,7 +141,7 @@ impl Journal {
     /// The requests for the episode so far; one without an outcome may have been billed.
     pub fn requests(&self) -> Requests {
         let mut requests = self.requests.clone();
-        requests.note_outcome(true);
+        requests.close(true);
         requests
     }
 
@@ -202,14 +191,18 @@ impl Journal {
     fn note(&mut self, entry: &Entry) {
         let Self { recorded, requests, .. } = self;
         match entry {
-            Entry::Request { at_most, .. } => requests.note_sent(*at_most),
+            Entry::Request { at_most, .. } => {
+                requests.close(true);
+                requests.sent += 1;
+                requests.open = Some(*at_most);
+            }
             Entry::Answer { t, question, latency_ms, body, .. } => {
-                let at_most = requests.at_most;
-                requests.note_outcome(false);
-                let (question, body) = (question.clone(), body.clone());
+                let (at_most, question, body) = (requests.close(false), question.clone(), body.clone());
                 recorded.insert(*t, Recorded { question, latency_ms: *latency_ms, body, at_most });
             }
-            Entry::Failure { may_be_paid, .. } => requests.note_outcome(*may_be_paid),
+            Entry::Failure { may_be_paid, .. } => {
+                requests.close(*may_be_paid);
+            }
         }
     }
 }
@@ -261,7 +254,7 @@ mod tests {
         let mut journal = Journal::open(&path).unwrap();
         let request = |most| {
             let (question, frame) = (String::new(), String::new());
-            Entry::Request { t: 1, attempt: 1, question, frame, at_most: Some([most, 10]) }
+            Entry::Request { t: 1, attempt: 1, question, frame, at_most: [most, 10] }
         };
         let failure = |may_be_paid| {
             let (status, detail, question) = ("timeout".to_owned(), String::new(), String::new());
@@ -274,7 +267,7 @@ mod tests {
             [request(3), request(4)],
         ];
         entries.iter().flatten().for_each(|entry| journal.append(entry).unwrap());
-        let unanswered = [Some([2, 10]), Some([3, 10]), Some([4, 10])];
+        let unanswered = [[2, 10], [3, 10], [4, 10]];
         assert_eq!((journal.requests().sent, journal.requests().unanswered), (4, unanswered.to_vec()));
         journal.append(&answer(1)).unwrap();
         let read = Journal::cassette(&path).unwrap().requests();

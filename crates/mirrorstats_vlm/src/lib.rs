@@ -6,18 +6,6 @@
 //!                                                          └──────────────────────────────┘
 //! ```
 //!
-//! | file | what it knows |
-//! |---|---|
-//! | `model`, `agent` | the shared state of a model's episodes; the model in one of them |
-//! | [`models`] | the models, their providers and prices |
-//! | [`wire_format`] | the format of requests and answers |
-//! | `request` | the body of a model's request, and the cost of its answer |
-//! | [`provider`] | sending requests: concurrency, failures, waits requested by providers |
-//! | [`probe`] | the parameters that a model takes |
-//! | `step` | the reaction to failures: another attempt, a lost episode, the end |
-//! | [`limits`], [`estimate`] | a run's spending limits; estimates |
-//! | [`journal`], `answered` | requests and answers on disk; statistics of a model from them |
-//!
 //! Rule: an answered request is never repeated, no answer takes effect before it is on disk, and keys leave
 //! this crate only in request headers. Nothing here needs the simulation.
 
@@ -25,17 +13,18 @@
 
 mod agent;
 mod answered;
-pub mod estimate;
+mod estimate;
+pub mod forecast;
 pub mod journal;
 pub mod limits;
 mod model;
 pub mod models;
-pub mod probe;
+mod player;
 pub mod provider;
 mod request;
 mod step;
 pub mod wire_format;
 
 pub use agent::VlmAgent;
-pub use answered::Typical;
-pub use model::{Memory, Vlm};
+pub use model::Vlm;
+pub use player::VlmPlayer;

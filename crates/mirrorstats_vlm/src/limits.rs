@@ -61,15 +61,8 @@ pub struct Limits {
 }
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "the limit of {what} is reached: {spent} of {limit}{next}\n  help: the same command with a higher limit continues"
-)]
-pub struct Reached {
-    what: &'static str,
-    spent: String,
-    limit: String,
-    next: String,
-}
+#[error("the limit of {0}\n  help: the same command with a higher limit continues")]
+pub struct Reached(String);
 
 /// The account of a run, shared by all of its episodes.
 #[derive(Debug, Default)]
@@ -108,8 +101,8 @@ pub struct Begun {
 }
 
 impl Account {
-    pub fn new(limits: Limits, spent: Spend) -> Self {
-        Self { limits, state: Mutex::new(SpendState { spend: spent, ..SpendState::default() }), ..Self::default() }
+    pub fn new(limits: Limits) -> Self {
+        Self { limits, ..Self::default() }
     }
 
     pub(crate) fn limits_cost(&self) -> bool {
@@ -120,7 +113,6 @@ impl Account {
         locked(&self.state).spend = spent;
     }
 
-    /// The spending so far, over all starts.
     pub fn spend(&self) -> Spend {
         locked(&self.state).spend
     }
@@ -128,26 +120,15 @@ impl Account {
     /// Reserves this maximum cost for a request about to be sent. Waits for requests in flight if their final cost
     /// decides.
     pub async fn reserve(self: &Arc<Self>, at_most_usd: Option<f64>) -> Result<Reserved, Reached> {
-        loop {
-            // A request that ends between the attempt and the wait is noticed.
-            let changed = self.changed.notified();
-            if let Some(at_most_usd) = self.reserve_now(&mut locked(&self.state), at_most_usd)? {
-                return Ok(Reserved { account: Arc::clone(self), at_most_usd, is_open: true });
-            }
-            changed.await;
-        }
+        let at_most_usd = self.wait_for(|state| self.reserve_now(state, at_most_usd).transpose()).await?;
+        Ok(Reserved { account: Arc::clone(self), at_most_usd, is_open: true })
     }
 
     /// Begins an episode of this many steps, with this maximum cost of the next one. Waits while episodes under way may
     /// need the rest of the limit.
     pub async fn begin(self: &Arc<Self>, steps: u64, at_most_usd: Option<f64>) -> Begun {
-        loop {
-            let changed = self.changed.notified();
-            if self.begin_now(&mut locked(&self.state), steps, at_most_usd) {
-                return Begun { account: Arc::clone(self), left: steps };
-            }
-            changed.await;
-        }
+        self.wait_for(|state| self.begin_now(state, steps, at_most_usd).then_some(())).await;
+        Begun { account: Arc::clone(self), left: steps }
     }
 
     /// Continues an episode that an earlier start began; it does not wait for others.
@@ -156,13 +137,29 @@ impl Account {
         Begun { account: Arc::clone(self), left: steps }
     }
 
+    async fn wait_for<T>(&self, attempt: impl Fn(&mut SpendState) -> Option<T>) -> T {
+        loop {
+            // A change between the attempt and the wait is noticed.
+            let changed = self.changed.notified();
+            if let Some(done) = attempt(&mut locked(&self.state)) {
+                return done;
+            }
+            changed.await;
+        }
+    }
+
+    fn change(&self, change: impl FnOnce(&mut SpendState)) {
+        change(&mut locked(&self.state));
+        self.changed.notify_waiters();
+    }
+
     fn reserve_now(&self, state: &mut SpendState, at_most_usd: Option<f64>) -> Result<Option<f64>, Reached> {
         let spend = state.spend;
         if let Some(limit) = self.limits.requests.filter(|limit| spend.requests >= *limit) {
-            return Err(reached("requests", spend.requests.to_string(), limit.to_string()));
+            return Err(Reached(format!("requests is reached: {} of {limit}", spend.requests)));
         }
         if let Some(limit) = self.limits.tokens.filter(|limit| spend.tokens >= *limit) {
-            return Err(reached("tokens", spend.tokens.to_string(), limit.to_string()));
+            return Err(Reached(format!("tokens is reached: {} of {limit}", spend.tokens)));
         }
         // An answer may cost more than its stated maximum; the higher cost counts.
         let next = at_most_usd.map_or(0.0, |usd| usd.max(state.dearest_usd));
@@ -171,8 +168,8 @@ impl Account {
             if state.in_flight > 0 {
                 return Ok(None);
             }
-            let next = format!("; the next request may cost {}", dollars(next));
-            return Err(Reached { next, ..reached("cost", dollars(spend.cost_at_most()), dollars(limit)) });
+            let [sum, limit, next] = [spend.cost_at_most(), limit, next].map(dollars);
+            return Err(Reached(format!("cost is reached: {sum} of {limit}; the next request may cost {next}")));
         }
         state.spend.requests += 1;
         state.in_flight += 1;
@@ -221,12 +218,11 @@ impl Reserved {
 
     fn close(&mut self, outcome: impl FnOnce(&mut SpendState)) {
         self.is_open = false;
-        let mut state = locked(&self.account.state);
-        state.in_flight -= 1;
-        state.reserved_usd = if state.in_flight == 0 { 0.0 } else { state.reserved_usd - self.at_most_usd };
-        outcome(&mut state);
-        drop(state);
-        self.account.changed.notify_waiters();
+        self.account.change(|state| {
+            state.in_flight -= 1;
+            state.reserved_usd = if state.in_flight == 0 { 0.0 } else { state.reserved_usd - self.at_most_usd };
+            outcome(state);
+        });
     }
 }
 
@@ -241,26 +237,18 @@ impl Drop for Reserved {
 
 impl Begun {
     pub(crate) fn note_left(&mut self, steps: u64) {
-        let mut state = locked(&self.account.state);
-        state.steps_left = state.steps_left + steps - self.left;
+        self.account.change(|state| state.steps_left = state.steps_left + steps - self.left);
         self.left = steps;
-        drop(state);
-        self.account.changed.notify_waiters();
     }
 }
 
 impl Drop for Begun {
     fn drop(&mut self) {
-        let mut state = locked(&self.account.state);
-        state.begun -= 1;
-        state.steps_left -= self.left;
-        drop(state);
-        self.account.changed.notify_waiters();
+        self.account.change(|state| {
+            state.begun -= 1;
+            state.steps_left -= self.left;
+        });
     }
-}
-
-fn reached(what: &'static str, spent: String, limit: String) -> Reached {
-    Reached { what, spent, limit, next: String::new() }
 }
 
 fn dollars(value: f64) -> String {
@@ -278,7 +266,9 @@ mod tests {
     use super::{Account, Limits, Spend};
 
     fn account(limits: Limits, spent: Spend) -> Arc<Account> {
-        Arc::new(Account::new(limits, spent))
+        let account = Account::new(limits);
+        account.begin_with(spent);
+        Arc::new(account)
     }
 
     /// Returns true if `work` is still waiting after a while.
@@ -338,7 +328,8 @@ mod tests {
         // An episode of an earlier start has already begun, and one is always under way.
         let (_old, spent) = (account.go_on(1_000), account.spend());
         assert!(waits(account.begin(1, Some(0.1))).await);
-        let poor = Arc::new(Account::new(Limits { cost_usd: Some(0.0), ..Limits::default() }, spent));
+        let poor = Arc::new(Account::new(Limits { cost_usd: Some(0.0), ..Limits::default() }));
+        poor.begin_with(spent);
         assert!(!waits(poor.begin(100, Some(0.1))).await);
     }
 }

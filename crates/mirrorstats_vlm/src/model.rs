@@ -11,28 +11,12 @@ use tokio::sync::Notify;
 
 use super::estimate;
 use super::limits::Account;
-use super::models::Choice;
+use super::models::{Choice, Model};
 use super::provider::{Provider, Unreachable};
 use super::wire_format::ModelAnswer;
 use crate::limits::Spend;
 use mirrorstats_agents::reply::Ending;
 use mirrorstats_agents::{Lost, locked};
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Memory {
-    /// A folder of journals to continue.
-    Journals(PathBuf),
-    /// A folder of journals to replay; no requests are sent.
-    Cassette(PathBuf),
-}
-
-impl Memory {
-    pub(super) fn path(&self, episode: &str) -> PathBuf {
-        match self {
-            Self::Journals(folder) | Self::Cassette(folder) => folder.join(format!("{episode}.jsonl")),
-        }
-    }
-}
 
 /// The costs of answers as stated by the provider, for models without prices.
 #[derive(Clone, Copy, Debug, Default)]
@@ -64,9 +48,9 @@ impl Learned {
 pub struct Vlm {
     pub(super) choice: Choice,
     /// `None` if all answers come from a cassette.
-    pub(super) provider: Option<Provider>,
-    pub(super) network: Option<Handle>,
-    pub(super) memory: Memory,
+    pub(super) online: Option<(Provider, Handle)>,
+    /// A journal per episode, to continue or to replay.
+    pub(super) folder: PathBuf,
     pub(super) account: Arc<Account>,
     stop: OnceLock<Lost>,
     stopped: Notify,
@@ -86,21 +70,15 @@ impl Vlm {
         journals: PathBuf,
         account: Arc<Account>,
     ) -> Self {
-        let (provider, network) = (Some(provider), Some(network));
-        Self { provider, network, account, ..Self::new(choice, Memory::Journals(journals)) }
+        Self { online: Some((provider, network)), account, ..Self::cassette(choice, journals) }
     }
 
     /// A model whose answers are replayed from journals; it needs no key and sends nothing.
     pub fn cassette(choice: Choice, folder: PathBuf) -> Self {
-        Self::new(choice, Memory::Cassette(folder))
-    }
-
-    fn new(choice: Choice, memory: Memory) -> Self {
         Self {
             choice,
-            provider: None,
-            network: None,
-            memory,
+            online: None,
+            folder,
             account: Arc::default(),
             stop: OnceLock::new(),
             stopped: Notify::new(),
@@ -109,6 +87,10 @@ impl Vlm {
             learned: Mutex::default(),
             has_answered: AtomicBool::new(false),
         }
+    }
+
+    pub(super) fn path(&self, episode: &str) -> PathBuf {
+        self.folder.join(format!("{episode}.jsonl"))
     }
 
     pub fn choice(&self) -> &Choice {
@@ -157,7 +139,7 @@ impl Vlm {
     }
 
     pub fn connect(&self) -> Result<(), Unreachable> {
-        self.provider.as_ref().map_or(Ok(()), Provider::connect)
+        self.online.as_ref().map_or(Ok(()), |(provider, _)| provider.connect())
     }
 
     pub fn max_output_tokens(&self) -> u32 {
@@ -174,20 +156,20 @@ impl Vlm {
             "id": self.choice.model.id,
             "backend": self.choice.model.backend,
             "contract": self.choice.model.contract.name(),
-            "temperature": self.choice.model.temperature.map_or_else(|| "default".into(), Value::from),
+            "temperature": self.choice.temperature().map_or_else(|| "default".into(), Value::from),
             "max_output_tokens": self.max_output_tokens(),
             "identification_version": mirrorstats_trace::episodes::identification::VERSION,
         });
-        if let Some(effort) = self.choice.model.reasoning_effort {
+        let Model { reasoning_effort, answers_as, accepted, .. } = &self.choice.model;
+        if let Some(effort) = reasoning_effort {
             description["reasoning_effort"] = effort.name().into();
         }
         let extra = self.choice.extra_body();
         if !extra.is_empty() {
             description["extra_body"] = extra.into();
         }
-        let (patterns, accepted) = (&self.choice.model.answers_as, &self.choice.model.accepted);
-        if !patterns.is_empty() && patterns != &["*"] {
-            description["answers_as"] = patterns.clone().into();
+        if !answers_as.is_empty() && answers_as != &["*"] {
+            description["answers_as"] = answers_as.clone().into();
         }
         if !accepted.is_empty() {
             description["accepted_models"] = accepted.clone().into();

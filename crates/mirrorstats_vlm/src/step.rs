@@ -33,7 +33,7 @@ type Exchanged = Result<Result<Asked, Failure>, Lost>;
 
 impl Step {
     pub(super) async fn ask(self) -> Result<Asked, Lost> {
-        let Some(provider) = &self.vlm.provider else {
+        let Some((provider, _)) = &self.vlm.online else {
             return Err(Lost::because("nothing is sent from a cassette".to_owned()));
         };
         let longest_wait = provider.patience().longest_wait;
@@ -45,7 +45,9 @@ impl Step {
             attempt += 1;
             let failure = match self.attempt(provider, attempt).await? {
                 Ok(asked) => return Ok(asked),
-                Err(failure) if !failure.kind.may_pass() => return Err(self.rejected(&failure)),
+                Err(failure) if !failure.kind.may_pass(self.vlm.has_answered.load(Ordering::Relaxed)) => {
+                    return Err(self.rejected(&failure));
+                }
                 Err(failure) => failure,
             };
             match waiting.next(&failure) {
@@ -86,7 +88,7 @@ impl Step {
         let over = |reached: Reached| self.vlm.halt(Lost::by_limit(reached.to_string()));
         let reserved = reserved.map_err(over)?;
         let (t, question) = (self.t, self.question.clone());
-        let (frame, at_most) = (self.frame.clone(), Some(self.at_most));
+        let (frame, at_most) = (self.frame.clone(), self.at_most);
         if let Err(lost) = self.write(&Entry::Request { t, attempt, question: question.clone(), frame, at_most }) {
             reserved.refused();
             return Err(lost);

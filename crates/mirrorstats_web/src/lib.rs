@@ -85,6 +85,11 @@ impl Guard {
         Self { address, name, token: token.map(str::to_owned), takes_posts: false }
     }
 
+    /// True if only this machine reaches the server.
+    pub fn is_local(&self) -> bool {
+        self.address.ip().is_loopback()
+    }
+
     /// The same for a server that takes what people send.
     #[must_use]
     pub fn taking_posts(self) -> Self {
@@ -208,6 +213,18 @@ pub fn check_token(token: &str) -> Result<(), String> {
             .to_owned());
     }
     Ok(())
+}
+
+/// A listener on this machine alone, or under a name or address that others reach, and its guard.
+pub fn listen(host: Option<&str>, port: u16, token: Option<&str>) -> std::io::Result<(std::net::TcpListener, Guard)> {
+    let listener = std::net::TcpListener::bind((host.unwrap_or("127.0.0.1"), port))?;
+    let guard = Guard::new(listener.local_addr()?, host, token);
+    Ok((listener, guard))
+}
+
+/// The message if a server cannot listen.
+pub fn cannot_listen(host: Option<&str>, port: u16, error: &std::io::Error) -> String {
+    format!("cannot listen on {}:{port}: {error}", host.unwrap_or("127.0.0.1"))
 }
 
 /// A token that nobody can guess: 32 hexadecimal digits.

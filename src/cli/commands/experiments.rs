@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cli::{Failure, Outcome, experiments, output};
+use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::{visible, visible_lines};
 use mirrorstats_exact::suggest::hint;
-use mirrorstats_experiment::explain::explained;
+use mirrorstats_experiment::explain::{Measured, explained};
 use mirrorstats_experiment::file::Loaded;
 use mirrorstats_experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
 
@@ -70,35 +70,46 @@ impl ExperimentsArgs {
 
 #[cfg(feature = "sim")]
 fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
-    experiments::placed(file, &mirrorstats_sim::config::WorldConfig::default())
+    Ok(mirrorstats_record::experiments::placed(file, &mirrorstats_sim::config::WorldConfig::default())?)
 }
 
 #[cfg(not(feature = "sim"))]
 fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
-    experiments::load(file)
+    Ok(mirrorstats_experiment::file::load(file)?)
 }
 
-/// The occlusion in scenes of the built-in world.
+/// What scenes of the built-in world tell.
 #[cfg(feature = "sim")]
-fn occlusion(experiment: &Experiment) -> Option<String> {
-    mirrorstats_sim::placement::Occlusion::described(&mirrorstats_sim::config::WorldConfig::default(), experiment)
+fn measured(experiment: &Experiment) -> Measured {
+    let config = mirrorstats_sim::config::WorldConfig::default();
+    let blind = mirrorstats_sim::blind::Blind::measured(&config, experiment);
+    let warning = blind.filter(mirrorstats_sim::blind::Blind::is_above_chance).map(|blind| {
+        let help = "draw colours that do not depend on the body's, or declare this rate in `chance`";
+        format!("warning: the scenes of {} give the answer away: {blind}\n  help: {help}", experiment.name())
+    });
+    let ways = mirrorstats_sim::placement::Ways::measured(&config, experiment).map(|ways| ways.described());
+    Measured { ways, blind: blind.map(|blind| blind.to_string()), warning }
 }
 
 #[cfg(not(feature = "sim"))]
-const fn occlusion(_: &Experiment) -> Option<String> {
-    None
+fn measured(_: &Experiment) -> Measured {
+    Measured::default()
 }
 
 fn check(file: &Path, json: bool) -> Result<Outcome, Failure> {
     let loaded = placed(file)?;
+    let all: Vec<Measured> = loaded.iter().map(|one| measured(&one.experiment)).collect();
+    all.iter().filter_map(|measured| measured.warning.as_deref()).for_each(output::say);
     if json {
         return answer(loaded.iter().map(|one| &one.experiment));
     }
-    let line = |Loaded { experiment, .. }: &Loaded| {
+    let line = |(Loaded { experiment, .. }, measured): (&Loaded, &Measured)| {
         let (title, prompt) = (visible(&experiment.title), visible(&experiment.prompt));
-        format!("  {}: {title}\n    prompt {prompt}, sha256 {}\n", experiment.name(), experiment.templates().hash())
+        let ways = measured.ways.as_ref().map_or_else(String::new, |ways| format!("    shortest way {ways}\n"));
+        let hash = experiment.templates().hash();
+        format!("  {}: {title}\n    prompt {prompt}, sha256 {hash}\n{ways}", experiment.name())
     };
-    let lines: String = loaded.iter().map(line).collect();
+    let lines: String = loaded.iter().zip(&all).map(line).collect();
     output::plain(format!("{}: no fault\n{lines}", visible(&file.display().to_string())))
 }
 
@@ -117,7 +128,7 @@ fn explain(path: &Path, prompt: bool, json: bool) -> Result<Outcome, Failure> {
     if json {
         return answer(experiments.iter());
     }
-    let words = |experiment| if prompt { prompt_of(experiment) } else { explained(experiment, occlusion(experiment)) };
+    let words = |experiment| if prompt { prompt_of(experiment) } else { explained(experiment, &measured(experiment)) };
     let texts: Vec<String> = experiments.iter().map(words).collect();
     output::plain(texts.join("\n") + "\n")
 }

@@ -4,6 +4,8 @@ pub(super) mod definitions;
 pub(super) mod experiments;
 #[cfg(all(feature = "sim", feature = "view"))]
 pub(super) mod participants;
+#[cfg(feature = "sim")]
+pub mod record;
 pub(super) mod setup;
 pub(super) mod study;
 pub(super) mod style;
@@ -16,8 +18,6 @@ pub(super) mod world;
 use study::view;
 use study::{diff, figure, gate, plan, query, report, score, stats};
 
-#[cfg(feature = "sim")]
-pub use self::world::record;
 use super::outcome::{Failure, Outcome};
 
 /// The commands, in the order of the help: those of a first use, then nouns.
@@ -32,7 +32,7 @@ pub enum Command {
     Diff(diff::DiffArgs),
     Gate(gate::GateArgs),
     #[cfg(feature = "sim")]
-    Record(Box<world::record::RecordArgs>),
+    Record(Box<record::RecordArgs>),
     Import(trace::import::ImportArgs),
     Query(query::QueryArgs),
     Plan(plan::PlanArgs),

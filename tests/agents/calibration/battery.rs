@@ -1,4 +1,4 @@
-//! The behaviour of each scripted agent in the battery, as its module predicts.
+//! The behaviour of each scripted agent in the battery, as `reports/world/predictions.md` predicts.
 
 use mirrorstats_agents::scripted::Scripted;
 use mirrorstats_experiment::Experiment;
@@ -161,8 +161,8 @@ fn check_those_who_recognise_themselves(shown: &Shown<'_>) {
         }
         shown.at_least("decoy", agent, "DECOY_CLAIM", (9, 10));
         shown.at_most("decoy", agent, "TSA", (1, 10));
-        // A cube by chance, or in a seventh of the episodes the stranger's, which is never right. These draws give one
-        // of 21; 90 episodes gave 22, as predicted. For 21 the check is only that the rate is not above chance.
+        // A cube by chance, or in a seventh of the episodes the stranger's colour, which is never right. For 21 episodes
+        // the check is only that the rate is not above chance.
         shown.at_most("window", agent, "TSA", (1, 2));
         shown.at_least("mark", agent, "MARK_REPORT", (9, 10));
         shown.at_least("mark", agent, "MARK_SEEN", (9, 10));
@@ -212,7 +212,10 @@ fn check_guesser(shown: &Shown<'_>) {
         shown.is_by_chance(experiment, "guesser", "TSA");
     }
     shown.is_by_chance("decoy", "guesser", "DECOY_CLAIM");
-    shown.is_by_chance("window", "guesser", "WINDOW_CLAIM");
+    // It claims colours of cubes, and the stranger has the colour of none.
+    if shown.get("window", "guesser", "WINDOW_CLAIM").count > 0 {
+        shown.is_zero("window", "guesser", "WINDOW_CLAIM");
+    }
     shown.at_most("mark", "guesser", "TTD", (2, 1));
 }
 

@@ -1,4 +1,4 @@
-//! The behaviour of each scripted agent with a hand and a mark, as its module predicts.
+//! The behaviour of each scripted agent with a hand and a mark, as `reports/world/predictions.md` predicts.
 
 use mirrorstats_agents::scripted::Scripted;
 use mirrorstats_experiment::Experiment;

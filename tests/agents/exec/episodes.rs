@@ -173,7 +173,7 @@ fn unreadable_replies_of_a_program_are_reported() {
         said.starts_with("a reply could not be read: parse_failed: `I go \\u{1b}[31mon.` (E1/exec/s1/r1, step 1)"),
         "{said}"
     );
-    let summary = "\n20 of 20 replies could not be read: parse_failed; first: `I go \\u{1b}[31mon.` (E1/exec/s1/r1, step 1): expected value at line 1 column 1\n";
+    let summary = "\n20 of 20 replies could not be read: parse_failed; first: `I go \\u{1b}[31mon.` (E1/exec/s1/r1, step 1): expected a JSON object, found text without one\n";
     assert!(said.contains(summary), "{said}");
     assert_eq!(answer["replies"]["unreadable"]["parse_failed"], 20);
 }

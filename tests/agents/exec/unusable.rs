@@ -20,7 +20,7 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
     let words = ["--runs", "2", "--threads", "1"];
     let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
     assert_eq!(code, Some(2), "{said}");
-    let last = "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 20): expected value at line 1 column 1";
+    let last = "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 20): expected a JSON object, found text without one";
     assert!(said.contains(&sentence(20, last)), "{said}");
     assert_eq!((&answer["recorded"], &answer["steps"], &answer["stopped"]), (&0.into(), &0.into(), &true.into()));
     assert!(!bench.path("runs/E1-exec.parquet").exists() && bench.lost().is_empty());
@@ -34,7 +34,7 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
     assert!(
         said.contains(&sentence(
             3,
-            "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 3): expected value at line 1 column 1"
+            "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 3): expected a JSON object, found text without one"
         )),
         "{said}"
     );
@@ -42,6 +42,17 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
     let all = [&words[..], &["--keep-going"]].concat();
     let (code, answer, said) = outcome(&bench.record(&all).output().unwrap());
     assert_eq!((code, &answer["recorded"], &answer["steps"]), (Some(0), &2.into(), &40.into()), "{said}");
+}
+
+#[test]
+fn the_message_names_the_difference_of_the_last_reply_from_the_schema() {
+    let bench = Bench::new();
+    bench.program(&format!("echo '{}'", FORWARD.replace("\"w\"", "\"stop\"")));
+    let (code, _, said) = outcome(&bench.record(&["--runs", "1", "--threads", "1"]).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    let (_, message) =
+        said.split_once("gave 20 replies in a row without a decision; the last: schema_invalid: ").unwrap();
+    assert!(message.contains("step 20): \"action\" is \"stop\", expected one of w, s, a, d, done\n"), "{said}");
 }
 
 #[test]
@@ -71,7 +82,10 @@ fn one_failing_episode_among_good_ones_ends_the_recording() {
     let (code, _, said) = outcome(&bench.record(&words).output().unwrap());
     assert_eq!(code, Some(2), "{said}");
     assert!(
-        said.contains(&sentence(6, "parse_failed: `no` (E1/exec/s1/r2, step 6): expected ident at line 1 column 2")),
+        said.contains(&sentence(
+            6,
+            "parse_failed: `no` (E1/exec/s1/r2, step 6): expected a JSON object, found text without one"
+        )),
         "{said}"
     );
     assert!(!bench.path("runs/E1-exec.parquet").exists());

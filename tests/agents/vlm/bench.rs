@@ -8,9 +8,8 @@ use mirrorstats_agents::secrets::Secret;
 use mirrorstats_agents::{Agent as _, Lost, Observation, Reply, Task};
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::spec::Stated;
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 use mirrorstats_vlm::Vlm;
-use mirrorstats_vlm::limits::Spend;
 use mirrorstats_vlm::limits::{Account, Limits};
 use mirrorstats_vlm::models::{Backend, Choice, Contract, Model, Prices};
 use mirrorstats_vlm::provider::{Patience, Provider};
@@ -73,7 +72,7 @@ pub struct Bench {
 impl Bench {
     pub fn new(limits: Limits) -> Self {
         let network = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
-        let account = Arc::new(Account::new(limits, Spend::default()));
+        let account = Arc::new(Account::new(limits));
         Self { folder: tempfile::tempdir().unwrap(), network, account }
     }
 

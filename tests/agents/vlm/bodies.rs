@@ -1,10 +1,10 @@
-//! The bodies of requests: the frame, then the words of the prompt, the schema's keys, and nothing else.
+//! The bodies of requests: the words of the prompt, then the frame, the schema's keys, and nothing else.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
 
 use mirrorstats_agents::prompt::{Prompt, Rendered};
-use mirrorstats_agents::reply;
+use mirrorstats_agents::{Task, reply};
 use mirrorstats_experiment::{Experiment, built_in_names};
 use mirrorstats_vlm::limits::Limits;
 use mirrorstats_vlm::wire_format::{Effort, WireFormat};
@@ -99,11 +99,11 @@ fn strings(value: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn the_frame_comes_before_the_words_with_every_provider() {
+fn the_frame_follows_the_words_with_every_provider() {
     for wire_format in PROVIDERS {
         for experiment in built_in() {
             let (body, words) = body(wire_format, &experiment);
-            let [image, text] = parts(wire_format, &body) else { panic!("{wire_format:?}: {body}") };
+            let [text, image] = parts(wire_format, &body) else { panic!("{wire_format:?}: {body}") };
             assert_eq!(text["text"], words.user.as_str(), "{wire_format:?}");
             let is_frame = |text: &&str| text.contains("iVBORw0KGgo");
             assert_eq!(strings(image).iter().filter(|text| is_frame(text)).count(), 1, "{wire_format:?}: {image}");
@@ -149,6 +149,7 @@ fn token_limit_and_reasoning_have_each_providers_parameters() {
         (WireFormat::OpenaiChat, "m", "/max_completion_tokens", "/reasoning_effort", json!("low")),
         (WireFormat::OpenaiCompatible, "m", "/max_tokens", "/reasoning_effort", json!("low")),
         (WireFormat::AnthropicMessages, "m", "/max_tokens", "/output_config/effort", json!("low")),
+        (WireFormat::AnthropicMessages, "m", "/max_tokens", "/thinking", json!({ "type": "adaptive" })),
         (
             WireFormat::Gemini,
             "gemini-2.5-pro",
@@ -180,4 +181,52 @@ fn token_limit_and_reasoning_have_each_providers_parameters() {
         assert_eq!(body.pointer(place), None, "{wire_format:?}");
         assert_eq!(description.get("reasoning_effort"), None);
     }
+}
+
+#[test]
+fn a_temperature_that_would_have_no_effect_is_neither_sent_nor_recorded() {
+    let asked = |wire_format: WireFormat, id: &str, effort: Option<Effort>| {
+        let server = Server::start(move |_, _| whole(wire_format, &decision("w")));
+        let bench = Bench::new(Limits::default());
+        let mut choice = choice(wire_format);
+        id.clone_into(&mut choice.model.id);
+        choice.model.answers_as = vec!["*".to_owned()];
+        choice.model.reasoning_effort = effort;
+        let vlm = bench.vlm_of(&server, choice, patience());
+        Bench::play(&vlm, "episode", 1).remove(0).unwrap();
+        let body = server.requests().remove(0).json();
+        let sent = body.get("temperature").or_else(|| body.pointer("/generationConfig/temperature")).cloned();
+        (sent, vlm.description()["temperature"].clone(), body["thinking"].clone())
+    };
+    let (used, unused) = ((Some(json!(0.2)), json!(0.2)), (None, json!("default")));
+    let (off, on) = (json!({ "type": "disabled" }), json!({ "type": "adaptive" }));
+    for (wire_format, id, effort, expected, thinking) in [
+        (WireFormat::Gemini, "gemini-3.1-pro-preview", None, &used, Value::Null),
+        (WireFormat::Gemini, "gemini-3.8-flash", None, &unused, Value::Null),
+        (WireFormat::OpenaiCompatible, "google/gemini-3.6-flash", None, &unused, Value::Null),
+        (WireFormat::OpenaiChat, "gpt-5.1", Some(Effort::Low), &used, Value::Null),
+        (WireFormat::AnthropicMessages, "claude-sonnet-4-6", None, &used, Value::Null),
+        (WireFormat::AnthropicMessages, "claude-sonnet-4-6", Some(Effort::None), &used, off),
+        (WireFormat::AnthropicMessages, "claude-sonnet-4-6", Some(Effort::High), &unused, on),
+    ] {
+        let (sent, recorded, thought) = asked(wire_format, id, effort);
+        assert_eq!((&(sent, recorded), thought), (expected, thinking), "{id}, {effort:?}");
+    }
+}
+
+/// Seed and run determine the colour of the body, so a request must not contain them in any form.
+#[test]
+fn requests_are_equal_for_every_seed_and_run_with_equal_observations() {
+    let of = |seed: u64, episode: &str| {
+        let server = Server::start(|_, _| whole(WireFormat::OpenaiChat, &decision("w")));
+        let bench = Bench::new(Limits::default());
+        let task = Task { seed, ..task(Experiment::E1) };
+        let played = Bench::play_task(&bench.vlm(&server, WireFormat::OpenaiChat), task, episode, 3);
+        assert!(played.iter().all(Result::is_ok));
+        let head = |head: &str| head.lines().filter(|line| !line.starts_with("host:")).collect::<Vec<_>>().join("\n");
+        server.requests().iter().map(|request| (head(&request.head), request.body.clone())).collect::<Vec<_>>()
+    };
+    let requests = of(1, "E1-1-1@model");
+    assert_eq!(requests.len(), 3);
+    assert_eq!(requests, of(1 << 40, "E1-3141-59@model"));
 }

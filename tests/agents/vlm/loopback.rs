@@ -16,17 +16,22 @@ use super::bench::KEY;
 use super::recordings::Folder;
 use crate::harness::program::{program, run, stderr};
 
-/// A server of `examples/providers`; it is killed when this is dropped.
-struct Provider {
+/// A server of `examples` in Python; it is killed when this is dropped.
+pub struct Provider {
     process: Child,
-    address: String,
+    pub address: String,
 }
 
 impl Provider {
     fn start(name: &str) -> Self {
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/providers/{name}.py"));
+        Self::serve(&format!("providers/{name}.py"), &[], Path::new(""))
+    }
+
+    /// Starts a script of `examples` that prints its address, with packages from a folder.
+    pub fn serve(script: &str, words: &[&str], packages: &Path) -> Self {
         let mut command = Command::new("python3");
-        command.arg(script).env("PYTHONDONTWRITEBYTECODE", "1").stdout(Stdio::piped());
+        command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(script)).args(words);
+        command.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", packages).stdout(Stdio::piped());
         let mut process = command.spawn().expect("python3 runs the servers");
         let mut address = String::new();
         BufReader::new(process.stdout.take().unwrap()).read_line(&mut address).unwrap();
@@ -172,79 +177,10 @@ fn a_killed_study_is_continued_by_the_same_command() {
 }
 
 #[test]
-fn a_probe_reports_each_models_parameters() {
-    let folder = Folder::new();
-    let servers = prepare(&folder, "experiment = \"E1\"\nseeds = 1\nruns = 1");
-    let models = folder.path().join("models.toml");
-    let wrong = "[model.Old]\nbackend = \"anthropic\"\nid = \"claude-sonnet-5-5\"\n\
-                 [model.Rerouted]\nbackend = \"gemini\"\nid = \"gemini-2.5-pro\"\n\
-                 [model.Routed]\nbackend = \"openrouter\"\nid = \"google/gemma\"\nreasoning_effort = \"low\"\n\
-                 extra_body = { provider = { only = [\"a\"], require_parameters = true } }\n";
-    std::fs::write(&models, std::fs::read_to_string(&models).unwrap() + wrong).unwrap();
-    let typed = |words: &[&str]| {
-        let mut command = program(folder.path());
-        command.env("LOOPBACK_KEY", KEY).args(["record", "--probe"]).args(words).output().unwrap()
-    };
-    let probed = |words: &[&str], code| {
-        let output = typed(&[words, &["--json"]].concat());
-        assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
-        serde_json::from_slice::<Vec<Value>>(&output.stdout).unwrap()
-    };
-
-    let answers = probed(&["study.toml"], 0);
-    let names: Vec<&str> = answers.iter().map(|answer| answer["model"].as_str().unwrap()).collect();
-    assert_eq!(names, ["Flash", "GPT 5.1", "GPT 6.1", "Gemma", "Haiku", "Own", "Pro", "Sonnet"]);
-    let of = |key: &str| answers.iter().map(|answer| answer[key].clone()).collect::<Vec<_>>();
-    // The self-hosted server accepts the schema but ignores it, and states no price.
-    assert_eq!(of("enforces_schema"), [true, true, true, true, true, false, true, true].map(Value::from));
-    assert_eq!((&of("cost_usd")[3], &of("cost_usd")[5]), (&Value::from(0.0007), &Value::Null));
-    assert_eq!(
-        (&of("answered_by")[1], &of("answered_by")[6]),
-        (&"gpt-5.1-2026-09-29".into(), &"gemini-3.8-flash".into())
-    );
-    assert!(of("latency_ms").iter().all(Value::is_u64) && of("fault").iter().all(Value::is_null));
-    let parameter = |answer: &Value, name: &str| {
-        let all = answer["parameters"].as_array().unwrap();
-        all.iter().find(|parameter| parameter["name"] == name).cloned().unwrap_or_default()
-    };
-    assert_eq!(parameter(&answers[1], "temperature")["taken"], true);
-    let limit = |at: usize| &answers[at]["rate_limits"][0];
-    assert_eq!((&limit(1)["counts"], &limit(1)["limit"]), (&"requests".into(), &60.0.into()));
-    assert!(limit(1)["remaining"].is_number() && limit(1)["renewed"] == "30ms");
-    assert!(limit(7)["remaining"].is_number() && limit(7)["limit"].is_null(), "Anthropic's headers");
-    assert_eq!(answers[0]["rate_limits"], Value::Array(Vec::new()), "Gemini states none");
-    assert_eq!(parameter(&answers[2], "temperature"), Value::Null, "it is not sent");
-
-    let words = ["--models", "models.toml", "--model", "Old", "--model", "Rerouted", "--model", "Routed"];
-    let [old, rerouted, routed] = probed(&words, 1).try_into().unwrap();
-    let temperature = parameter(&old, "temperature");
-    assert_eq!((&temperature["taken"], &temperature["line"]), (&false.into(), &"temperature = \"default\"".into()));
-    assert_eq!((&old["requests"], &old["enforces_schema"]), (&2.into(), &true.into()));
-    assert_eq!((&rerouted["is_model"], &rerouted["fault"]), (&false.into(), &Value::Null));
-    assert_eq!(parameter(&routed, "extra_body.provider")["taken"], false);
-    assert_eq!(parameter(&routed, "reasoning_effort")["taken"], true);
-
-    let said = String::from_utf8(typed(&words).stdout).unwrap();
-    for line in [
-        "Old (claude-sonnet-5-5): answered by `claude-sonnet-5-5` in ",
-        "  temperature = 0.2: refused: temperature = \"default\"\n",
-        "  contract = \"schema\": taken and enforced\n",
-        " requests left, renewed: ",
-        "another model answers, `gemini-3.8-flash`: --accept-model gemini-3.8-flash records it",
-    ] {
-        assert!(said.contains(line), "{line}: {said}");
-    }
-    drop(servers);
-    let output = typed(&words[..4]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(!folder.path().join("runs").exists(), "a probe writes nothing");
-}
-
-#[test]
 fn the_flex_tier_is_asked_for_and_costs_half() {
     let folder = Folder::new();
     let _servers = prepare(&folder, "");
-    let record = |model: &str, words: &str| {
+    let record = |model: &str| {
         let mut command = program(folder.path());
         command.env("LOOPBACK_KEY", KEY).args([
             "record",
@@ -267,24 +203,17 @@ fn the_flex_tier_is_asked_for_and_costs_half() {
             "--tier",
             "flex",
         ]);
-        command.args(words.split_whitespace()).output().unwrap()
+        command.output().unwrap()
     };
     for model in ["GPT 5.1", "Flash"] {
-        let output = record(model, "");
+        let output = record(model);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
         // Eight answers, at half of the full price of 0.00164 dollars.
         let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
         assert!((cost - 8.0 * 0.001_64 / 2.0).abs() < 1e-9, "{model}: {cost}");
     }
-    let probed = record("Flash", "--probe");
-    let probed: Value = serde_json::from_slice(&probed.stdout).unwrap();
-    let parameters = probed["parameters"].as_array().unwrap();
-    assert!(
-        parameters.iter().any(|sent| sent["name"] == "extra_body.serviceTier" && sent["value"] == "flex"),
-        "{probed}"
-    );
-    let refused = record("Haiku", "");
+    let refused = record("Haiku");
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("the backend `anthropic` has no such tier"), "{}", stderr(&refused));
 }

@@ -10,12 +10,14 @@ mod killed;
 mod languages;
 mod loopback;
 mod memory;
+mod odd;
 #[cfg(target_os = "linux")]
 mod power;
 mod providers;
 mod reach;
 mod recordings;
 mod refusals;
+mod seeing;
 pub mod server;
 mod spending;
 mod statuses;

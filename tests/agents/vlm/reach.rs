@@ -64,6 +64,42 @@ fn a_server_that_takes_no_images_ends_the_recording_with_its_first_answer() {
 }
 
 #[test]
+fn an_answer_in_another_shape_ends_the_recording_with_its_first_answer() {
+    let text = json!([{ "type": "output_text", "text": decision("w") }]);
+    let responses = json!({ "object": "response", "output": [{ "type": "message", "content": text }] });
+    let chunk = json!({ "choices": [{ "delta": { "content": decision("w") } }] });
+    let stream = format!("data: {chunk}\n\ndata: [DONE]\n\n");
+    let page = "<html><body>Welcome</body></html>";
+    for (answer, found) in [
+        (ok(&responses), "an answer of OpenAI's Responses"),
+        (http("200 OK", "content-type: text/event-stream\r\n", stream.as_bytes()), "a stream of events"),
+        (http("200 OK", "content-type: text/html\r\n", page.as_bytes()), "a page of HTML or XML"),
+        (http("200 OK", JSON, page.as_bytes()), "a page of HTML or XML"),
+    ] {
+        let server = Server::start(move |_, _| answer.clone());
+        let folder = Folder::new();
+        let (code, said) = recorded(&folder, &server, "--seeds 1 --runs 3 --threads 1 --in-flight 1");
+        assert_eq!((code, server.count()), (Some(2), 1), "{said}");
+        let expected = format!("expected an answer of the wire format \"openai-compatible\", found {found}: ");
+        assert!(said.contains(&expected), "{said}");
+        assert!(said.contains("\n  help: check `--base-url` and the backend's `wire_format`"), "{said}");
+    }
+}
+
+#[test]
+fn a_page_after_an_answer_is_an_outage() {
+    let server = Server::start(|at, _| match at {
+        1 => http("200 OK", "content-type: text/html\r\n", b"<html>Bad gateway</html>"),
+        _ => whole(WireFormat::OpenaiChat, &decision("w")),
+    });
+    let bench = Bench::new(Limits::default());
+    let vlm = bench.vlm(&server, WireFormat::OpenaiChat);
+    let replies = Bench::play(&vlm, "episode", 2);
+    assert!(replies.iter().all(Result::is_ok), "{replies:?}");
+    assert_eq!((vlm.stopped(), server.count()), (None, 3));
+}
+
+#[test]
 fn refused_images_are_a_failure_not_an_outage() {
     let server = Server::start(|at, _| match at {
         0 => whole(WireFormat::OpenaiChat, &decision("w")),

@@ -33,7 +33,7 @@ fn a_recording_without_readable_replies_says_so_everywhere() {
     let start = r"`I go on.\u{a}\u{1b}[31m[key] on and on and";
     let summary = format!("\n200 of 200 replies could not be read: parse_failed; first: {start}");
     assert!(said.contains(&summary), "{said}");
-    assert!(said.contains("...` (E1/own/s1/r1, step 1): expected value at line 1 column 1\n"), "{said}");
+    assert!(said.contains("...` (E1/own/s1/r1, step 1): expected a JSON object, found text without one\n"), "{said}");
     // It is reported before the recording ends.
     assert!(said.starts_with(&format!("a reply could not be read: parse_failed: {start}")), "{said}");
     assert!(said.lines().all(|line| line.len() < 400) && !said.contains('\u{1b}') && !said.contains(KEY), "{said}");
@@ -45,7 +45,7 @@ fn a_recording_without_readable_replies_says_so_everywhere() {
     assert_eq!((&first["episode_id"], &first["step"]), (&"E1/own/s1/r1".into(), &1.into()));
     assert!(first["text"].as_str().unwrap().len() <= 203, "{first}");
     // The trace, the answer and the check state the parser's reason.
-    let why = "expected value at line 1 column 1";
+    let why = "expected a JSON object, found text without one";
     assert_eq!(first["fault"], why);
     let faults = traces::texts(&folder.path().join("runs/E1-own.parquet"), "reply_fault");
     assert_eq!(faults, vec![Some(why.to_owned()); 200]);
@@ -101,7 +101,7 @@ fn statuses_are_counted_separately_and_readable_replies_not_listed() {
     let folder = short();
     let output = folder.record(&server, "own", "--seeds 1 --runs 1 --json").output().unwrap();
     let said = stderr(&output);
-    let summary = "3 of 20 replies could not be read: parse_failed 1, refusal 2; first: `I go on.` (E1/own/s1/r1, step 2): expected value at line 1 column 1";
+    let summary = "3 of 20 replies could not be read: parse_failed 1, refusal 2; first: `I go on.` (E1/own/s1/r1, step 2): expected a JSON object, found text without one";
     assert!(said.contains(summary), "{said}");
     let (text, json) = told(&folder, "info");
     assert!(text.contains("3 of 20 replies could not be read: parse_failed 1, refusal 2"), "{text}");

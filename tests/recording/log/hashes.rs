@@ -4,19 +4,16 @@ use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
-use arrow::array::{ArrayRef, Int32Array};
 use mirrorstats_log::read::episode_hashes;
-use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::episodes::episode_hash;
-use mirrorstats_trace::schema;
-use mirrorstats_trace::write::OptionalColumns;
-use mirrorstats_trace::write::merge::{self, EpisodeRows};
+use mirrorstats_trace::read::episode_rows;
+use mirrorstats_trace::write::write_episodes;
 use serde_json::Value;
 
 use super::logs::{Desk, RECORDING, SHORT, ids, json, recovered};
 use crate::harness::files::{fixture, write_small_world};
-use crate::harness::program::{run, succeeds, typed};
-use crate::harness::traces::{recording, rows};
+use crate::harness::program::run;
+use crate::harness::traces::{episodes, recording};
 
 /// The log with another value in the first decision that has the key, and with valid checksums: the work of a program
 /// that does not know the hash.
@@ -44,10 +41,9 @@ fn edited(key: &str, value: &Value) -> Vec<u8> {
 
 /// Changes a count in the first episode of the trace at `path`, which gives it another hash.
 fn alter(path: &Path) {
-    let mut episodes = merge::read(path).unwrap();
-    let values: ArrayRef = std::sync::Arc::new(Int32Array::from(vec![123_456; episodes[0].len()]));
-    episodes[0] = episodes[0].with_columns(&[("mirror_px", values)]).unwrap();
-    merge::write(path, Some(&recording(path)), &episodes).unwrap();
+    let mut all = episodes(path);
+    all[0].steps.iter_mut().for_each(|step| step.extra.mirror_px = Some(123_456));
+    write_episodes(path, Some(recording(path)), &all).unwrap();
 }
 
 #[test]
@@ -56,7 +52,7 @@ fn log_trace_and_rows_have_the_same_episode_hash() {
     fs::write(desk.trace(), &RECORDING.trace).unwrap();
     fs::write(desk.trace().with_extension("mcap"), &RECORDING.log).unwrap();
     let logged = episode_hashes(&desk.trace().with_extension("mcap")).unwrap();
-    let traced = merge::read(&desk.trace()).unwrap();
+    let traced = episode_rows::read(&desk.trace()).unwrap();
     assert_eq!((logged.len(), traced.len()), (3, 3));
     for rows in traced {
         let hash = episode_hash::hash_of(&rows.episode().unwrap());
@@ -118,27 +114,4 @@ fn a_film_strip_of_a_mismatched_log_and_trace_is_refused() {
     let said = strip("parted.svg").refused();
     assert!(said.contains("do not belong together") && said.contains("E1-guesser.mcap"), "{said}");
     assert!(!folder.path().join("parted.svg").exists());
-}
-
-/// Episodes recorded beside rows of a version without hashes get the same columns.
-#[test]
-fn a_recording_that_was_begun_without_hashes_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    write_small_world(folder.path(), SHORT);
-    let words = "record --config small.toml --agent random --experiment E1 --seeds 1 --no-log";
-    let record = |more: &str| succeeds(&mut typed(folder.path(), &format!("{words} {more}")));
-    record("--runs 2 --out whole");
-    record("--runs 1 --out runs");
-    let trace = folder.path().join("runs/E1-random.parquet");
-    let begun = merge::read(&trace).unwrap();
-    let stored = rows(&trace).schema();
-    let optional: Vec<&str> = stored.fields().iter().map(|field| field.name().as_str()).collect();
-    let is_kept = |name: &&str| *name != "episode_hash" && !schema::column(name).unwrap().required;
-    let columns = OptionalColumns::named(&optional.into_iter().filter(is_kept).collect::<Vec<_>>()).unwrap();
-    let without = |rows: &EpisodeRows| Episode { episode_hash: None, ..rows.episode().unwrap() };
-    let old: Vec<_> = begun.iter().map(|rows| merge::rows(&without(rows), &columns).unwrap()).collect();
-    merge::write(&trace, Some(&recording(&trace)), &old).unwrap();
-    assert!(merge::read(&trace).unwrap()[0].stated_hash().is_none());
-    record("--runs 2 --out runs");
-    assert!(fs::read(&trace).unwrap() == fs::read(folder.path().join("whole/E1-random.parquet")).unwrap());
 }

@@ -86,7 +86,9 @@ fn a_condition_is_a_column_of_traces_tables_and_figures() {
     // Older and newer traces together, and files of scores made from either.
     let both = run(at, &["score", &glimpses, "narrow"]).done();
     assert!(
-        both.starts_with("episode_id,model,experiment,seed,run,condition,scene,fingerprint,unusable_replies,TSA,"),
+        both.starts_with(
+            "episode_id,model,experiment,seed,run,condition,scene,fingerprint,origin,unusable_replies,TSA,"
+        ),
         "{both}"
     );
     run(at, &["score", &glimpses, "-o", "old.csv"]).done();

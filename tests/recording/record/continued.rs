@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use arrow::array::{ArrayRef, Int32Array};
 use mirrorstats_log::recover::recover;
-use mirrorstats_trace::write::merge;
+use mirrorstats_trace::write::write_episodes;
 
 use super::recordings::Bench;
 use crate::harness::files::assert_same;
 use crate::harness::program::{run, stderr};
-use crate::harness::traces::recording;
+use crate::harness::traces::{episodes, recording};
 
 fn words(runs: u32) -> String {
     format!("--agent random --experiment E1 --seeds 1 --runs {runs} --threads 1")
@@ -85,20 +84,18 @@ fn a_log_with_an_episode_missing_from_the_trace_is_refused() {
     refused(&bench, &words(4), &expected);
 }
 
-/// Changes a column of the trace's first episode.
-fn alter(trace: &Path, column: &str, value: i32) {
-    let recording = recording(trace);
-    let mut episodes = merge::read(trace).unwrap();
-    let values: ArrayRef = std::sync::Arc::new(Int32Array::from(vec![value; episodes[0].len()]));
-    episodes[0] = episodes[0].with_columns(&[(column, values)]).unwrap();
-    merge::write(trace, Some(&recording), &episodes).unwrap();
+/// Changes a count in the trace's first episode.
+fn alter(trace: &Path, value: i32) {
+    let mut all = episodes(trace);
+    all[0].steps.iter_mut().for_each(|step| step.extra.mirror_px = Some(value));
+    write_episodes(trace, Some(recording(trace)), &all).unwrap();
 }
 
 #[test]
 fn a_log_with_different_rows_is_refused() {
     let bench = Bench::new();
     bench.recorded("runs", &words(2));
-    alter(&bench.path("runs/E1-random.parquet"), "mirror_px", 123_456);
+    alter(&bench.path("runs/E1-random.parquet"), 123_456);
     let expected = [
         "its episode `E1/random/s1/r1` is not that of `runs/E1-random.parquet`: at t = 1, mirror_px: expected 123456, found ",
         "help: ",

@@ -49,11 +49,28 @@ fn invalid_and_out_of_range_numbers_are_refused() {
     for (line, more, expected) in [
         (5, "step_length = nan", "`step_length` may be 0.1 to 1, but is NaN"),
         (5, "steps = 0", "`steps` may be 1 to 100000, but is 0"),
-        (6, "[[experiment.mine.mirror]]\nwidth = inf", "`width` may be 0.5 to 10, but is inf"),
-        (6, "[[experiment.mine.mirror]]\nheight = -inf", "`height` may be 0.5 to 5, but is -inf"),
+        (6, "[[experiment.mine.mirror]]\nwidth = inf", "`width` may be 0.1 to 10, but is inf"),
+        (6, "[[experiment.mine.mirror]]\nheight = -inf", "`height` may be 0.1 to 5, but is -inf"),
         (5, "mirror = [{}, {}, {}, {}, {}]", "`mirror` may have at most 4 items, but has 5"),
         (5, "chance = { TSA = \"4/0\" }", "4/0"),
         (5, "[[experiment.mine.mirror]]\nwidth = 9.5", "a mirror of 9.5 m does not fit onto a wall of 8 m"),
+        (5, "mirror = [{ bottom = 2.0, height = 2.0 }]", "does not fit below a ceiling of 2.8 m"),
+        (
+            5,
+            "mirror = [{ wall = \"east\", width = 6 }, { wall = \"east\", width = 6 }]",
+            "overlaps another one on its wall",
+        ),
+        (5, "mirror = [{ wall = \"same\" }]", "the first mirror is beside no other"),
+        (5, "mirror = [{ wall = \"floor\" }]", "`wall` is one of random, opposite, same, east, north, west, south"),
+        (5, "mirror = [{ from_t = 9, until_t = 3 }]", "`until_t` is 3, before `from_t`, which is 9"),
+        (6, "mirror = [{}]\nsteps = 2", "21 of them need more than 2"),
+        (
+            5,
+            "view = { width = 1920, height = 480, fovy = 110 }\nmirror = [{}]",
+            "the mirror is in view at the start of",
+        ),
+        (5, "view = { eye_height = 0.4 }", "`eye_height` may be 0.5 to 1.9, but is 0.4"),
+        (5, "view = { eye_height = 0.8 }\ncamera = \"behind\"", "the camera is behind the body"),
     ] {
         refused_in(&bench, line, &format!("{HEAD}{more}\n"), &[expected]);
     }
@@ -204,8 +221,24 @@ fn a_room_too_small_for_its_cubes_is_refused() {
     let before = bench.files("");
     let words = "record --agent frozen --experiment mine.toml --seeds 1 --runs 1 --config small.toml --out runs";
     let said = run(bench.folder.path(), &words.split(' ').collect::<Vec<_>>()).refused();
-    for expected in ["no room for the cubes", "--> mine.toml:4:", "^", "help: fewer cubes or others"] {
+    for expected in ["no room for all its objects", "--> mine.toml:4:", "^", "help: use a larger `room.size`, or fewer"]
+    {
         assert!(said.contains(expected), "{said}");
     }
     assert_same(&bench.files(""), &before);
+}
+
+#[test]
+fn a_budget_too_short_for_some_scenes_is_printed_with_their_number() {
+    let bench = Bench::new();
+    let folder = bench.folder.path();
+    let head = HEAD.replace("cubes = { kind = \"none\" }\n", "").replace("exploration", "cube-selection");
+    let check = |keys: &str| {
+        fs::write(bench.path("mine.toml"), format!("{head}{keys}\nmirror = [{{}}]\n")).unwrap();
+        run(folder, &["experiments", "check", "mine.toml"]).done()
+    };
+    let said = check("scenes = \"E1\"\nsteps = 30");
+    assert!(said.contains("no fault\n") && said.contains("    shortest way 9 to 35 steps in 21 scenes; "), "{said}");
+    assert!(said.contains("; 1 of them need more than 30\n"), "{said}");
+    assert!(check("scenes = \"E1\"").contains("; 0 of them need more than 100\n"));
 }

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use mirrorstats_trace::read::episode_rows;
 use mirrorstats_trace::write::merge;
 use serde_json::{Value, json};
 
@@ -93,7 +94,7 @@ fn episodes_of_another_world_or_another_agent_are_not_mixed() {
 fn alter(trace: &Path, change: impl FnOnce(&mut serde_json::Map<String, Value>)) {
     let mut recording = recording(trace);
     change(recording.as_object_mut().unwrap());
-    merge::write(trace, Some(&recording), &merge::read(trace).unwrap()).unwrap();
+    merge::write(trace, Some(&recording), &episode_rows::read(trace).unwrap()).unwrap();
 }
 
 #[test]

@@ -71,7 +71,7 @@ fn an_altered_distance_is_reported() {
         let known = longest.steps.iter().position(|step| step.extra.cube_distance.is_some()).unwrap();
         i32::try_from(known + 1).unwrap()
     };
-    let (expected, found) = check("E3", further, at("E3"), "cube_distance");
+    let (expected, found) = check("E4", further, at("E4"), "cube_distance");
     assert!((expected.parse::<f32>().unwrap() - found.parse::<f32>().unwrap() - 0.5).abs() < 1e-5);
 }
 

@@ -47,7 +47,7 @@ fn a_trace_without_its_world_is_refused() {
     for (key, value, expected) in [
         ("world", Value::Null, "cannot be read"),
         ("world_hash", "0123".into(), "expected the hash 0123, found "),
-        ("scene_version", 99.into(), "version 99 of the scenes, and this program draws versions 2 and 3"),
+        ("scene_version", 99.into(), "version 99 of the scenes, and this program draws version 4"),
     ] {
         let (_folder, path) = copy("E1", |_, recording| recording[key] = value);
         let output = replay(&path, &[]);

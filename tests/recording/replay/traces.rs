@@ -15,9 +15,10 @@ use crate::harness::files::write_small_world;
 use crate::harness::program::{program, succeeds, typed};
 use crate::harness::traces::{episodes, recording};
 
-/// Recordings of E1, E3, E4 and `decoy` with a small eye; two pixels count as evidence. Made once.
+/// Recordings of E1, E3, E4 and `decoy` with a small eye; two pixels count as evidence. Made once per process: cargo-nextest
+/// runs each test in a process of its own.
 pub static RECORDED: LazyLock<PathBuf> = LazyLock::new(|| {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("replayed");
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("replayed-{}", std::process::id()));
     drop(fs::remove_dir_all(&folder));
     fs::create_dir_all(&folder).unwrap();
     write_small_world(&folder, "episode.steps = 40\nevidence.mirror_self_px = 2\n");

@@ -2,15 +2,16 @@
 
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::spec::Body;
+use mirrorstats_log::write::{Form, Solid};
 use mirrorstats_sim::body::{Figure, Pose, Stride};
 use mirrorstats_sim::config::WorldConfig;
-use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::rng::Rng;
-use mirrorstats_sim::snapshot::{Shape, Solid};
-use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats_sim::visibility::{Shown, labels};
 use mirrorstats_sim::world::World;
 
+use super::label_camera::LabelCamera;
+use super::mujoco_rays::labels_by_mujoco;
 use super::poses::{scatter, shaped, shaped_world, world};
 use crate::harness::need;
 
@@ -25,15 +26,15 @@ fn a_body_never_shows_directly_in_its_own_view() {
 fn never_shows(shape: Body, poses: usize) {
     let mut chance = Rng::for_run(7, 7, 7);
     need::drawing();
-    let mut eye = LabelCamera::new(&shaped(shape), 160, 120).unwrap();
+    let mut eye = LabelCamera::new(&shaped(shape), 160, 120);
     let mut world = shaped_world(shape, Experiment::E1, 4);
     for at in 0..poses {
         scatter(&mut world, &mut chance);
         assert_eq!(world.visibility().self_direct_px, 0, "rays, {:?}", world.figures());
-        let drawn = eye.labels(&world).unwrap();
+        let drawn = eye.labels(&world);
         assert!(!drawn.codes.contains(&OWN.code()), "picture, {:?}", world.figures());
         if at % 100 == 0 {
-            let met = labels_by_mujoco(&world, 160, 120).unwrap();
+            let met = labels_by_mujoco(&world, 160, 120);
             assert!(!met.codes.contains(&OWN.code()), "mujoco, {:?}", world.figures());
         }
     }
@@ -95,7 +96,7 @@ fn every_solid_is_inside_the_room() {
         for _ in 0..20 {
             scatter(&mut world, &mut chance);
             let half = world.config().room.size / 2.0 - world.config().mirror.gap;
-            for solid in world.snapshot().solids.iter().filter(|solid| !matches!(solid.shape, Shape::Plane(_))) {
+            for solid in world.snapshot().solids.iter().filter(|solid| !matches!(solid.form, Form::Plane(_))) {
                 for ([x, y, z], radius) in ends(solid) {
                     let is_inside =
                         x.abs() + radius < half && y.abs() + radius < half && z - radius > -1e-9 && z + radius < 2.8;
@@ -125,10 +126,10 @@ fn a_humanoid_has_the_sizes_of_the_standard_one() {
         ("left_upper_arm", 0.04, 0.2771),
         ("right_forearm", 0.031, 0.2771),
     ] {
-        let Shape::Capsule { radius: own, length: far } = part(name).shape else { panic!("{name} is no capsule") };
+        let Form::Capsule { radius: own, length: far } = part(name).form else { panic!("{name} is no capsule") };
         assert!((own - radius).abs() < 1e-6 && (far - length).abs() < 1e-3, "{name}: {own} {far}");
     }
-    assert!(matches!(part("head").shape, Shape::Sphere(radius) if (radius - 0.09).abs() < 1e-6));
+    assert!(matches!(part("head").form, Form::Sphere(radius) if (radius - 0.09).abs() < 1e-6));
     // Shoulder, elbow and hand are as far apart as in the model, although the arms hang down.
     let [shoulder, hand] = ["left_upper_arm", "left_hand"].map(part);
     let from = ends(shoulder).into_iter().map(|(at, _)| at).max_by(|a, b| a[2].total_cmp(&b[2])).unwrap();
@@ -142,7 +143,9 @@ fn shapes_and_strides() -> impl Iterator<Item = (Body, Stride)> {
 }
 
 fn own(world: &World) -> Vec<Solid> {
-    let solids = world.snapshot().solids.into_iter().filter(|solid| solid.item == Item::Agent(0)).collect::<Vec<_>>();
+    let snapshot = world.snapshot();
+    let solids = snapshot.solids.into_iter().zip(snapshot.items);
+    let solids: Vec<Solid> = solids.filter(|(_, item)| *item == Item::Agent(0)).map(|(solid, _)| solid).collect();
     let parts = if world.config().body.shape == Body::Humanoid { 19 } else { 21 };
     assert_eq!(solids.len(), parts);
     solids
@@ -153,14 +156,14 @@ fn ends(solid: &Solid) -> Vec<([f64; 3], f64)> {
     let [w, x, y, z] = solid.rotation;
     let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
     let along = |length: f64| [0, 1, 2].map(|at| solid.position[at] + length * axis[at]);
-    match solid.shape {
-        Shape::Capsule { radius, length } => vec![(along(length / 2.0), radius), (along(-length / 2.0), radius)],
-        Shape::Sphere(radius) => vec![(solid.position, radius)],
+    match solid.form {
+        Form::Capsule { radius, length } => vec![(along(length / 2.0), radius), (along(-length / 2.0), radius)],
+        Form::Sphere(radius) => vec![(solid.position, radius)],
         // All cubes are aligned with the walls.
-        Shape::Box(edges) => [-0.5, 0.5]
+        Form::Box(edges) => [-0.5, 0.5]
             .into_iter()
             .map(|side| ([0, 1, 2].map(|at| solid.position[at] + side * edges[at]), 0.0))
             .collect(),
-        Shape::Plane(_) => Vec::new(),
+        Form::Plane(_) => Vec::new(),
     }
 }

@@ -2,7 +2,10 @@
 
 mod body;
 mod framing;
+mod label_camera;
 mod motion;
+mod mujoco_rays;
+mod own_rooms;
 mod paint;
 mod panes;
 mod poses;

@@ -7,7 +7,7 @@ use mirrorstats_sim::floor::distance;
 use mirrorstats_sim::rng::Rng;
 use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::poses::world;
 

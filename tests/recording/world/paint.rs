@@ -7,7 +7,7 @@ use mirrorstats_sim::label_image::LabelImage;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::visibility::{Shown, labels};
 use mirrorstats_sim::world::World;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::poses::{face_mirror, world};
 use crate::harness::need;

@@ -3,14 +3,15 @@
 
 use mirrorstats_experiment::{Experiment, built_in, built_in_names, file};
 use mirrorstats_sim::config::WorldConfig;
-use mirrorstats_sim::label_camera::LabelCamera;
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::placement;
 use mirrorstats_sim::scene::Scene;
-use mirrorstats_sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats_sim::visibility::{Shown, labels};
 use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Action;
 
+use super::label_camera::LabelCamera;
+use super::mujoco_rays::labels_by_mujoco;
 use crate::harness::need;
 
 fn named(name: &str) -> Experiment {
@@ -79,17 +80,17 @@ fn no_body_has_the_colour_of_the_mark_or_of_the_hand() {
 fn visibility_of_hands_agrees_with_pictures_and_mujocos_rays() {
     need::drawing();
     let config = WorldConfig::default().for_experiment(&named("reach-mirror"));
-    let mut eye = LabelCamera::new(&config, 640, 480).unwrap();
+    let mut eye = LabelCamera::new(&config, 640, 480);
     for run in 1..=2 {
         let mut world = world("reach-mirror", 1, run);
         world.act(Some(Action::HandUp));
-        let (cast, drawn) = (labels(&world, 640, 480), eye.labels(&world).unwrap());
+        let (cast, drawn) = (labels(&world, 640, 480), eye.labels(&world));
         for shown in [Shown::Direct(Item::Hand), Shown::Through(0, Item::Hand), Shown::Through(0, Item::Mark(0))] {
             let count = |codes: &[u8]| codes.iter().map(|code| u32::from(*code == shown.code())).sum::<u32>();
             let (cast, drawn) = (count(&cast.codes), count(&drawn.codes));
             assert!(cast.abs_diff(drawn) <= 12 + cast / 8, "{shown:?}: {cast} cast, {drawn} drawn");
         }
-        let (small, rays) = (labels(&world, 80, 60), labels_by_mujoco(&world, 80, 60).unwrap());
+        let (small, rays) = (labels(&world, 80, 60), labels_by_mujoco(&world, 80, 60));
         let differing = small.codes.iter().zip(&rays.codes).filter(|(one, other)| one != other).count();
         assert!(differing <= 4, "{differing} pixels");
     }

@@ -3,14 +3,15 @@
 
 use mirrorstats_experiment::Experiment;
 use mirrorstats_experiment::spec::{Body, PaneKind};
+use mirrorstats_log::write::{Form, Solid};
 use mirrorstats_sim::model::Item;
 use mirrorstats_sim::rng::Rng;
 use mirrorstats_sim::scene::{HungPane, Scene};
-use mirrorstats_sim::snapshot::{Shape, Snapshot, Solid};
+use mirrorstats_sim::snapshot::Snapshot;
 use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::Action;
 
-use super::poses::shaped;
+use super::poses::{face_mirror, shaped};
 
 type Vector = [f64; 3];
 
@@ -31,17 +32,17 @@ fn turned(rotation: [f64; 4], vector: Vector) -> Vector {
 }
 
 /// The distance at which a ray meets a shape at the origin with axis z; `None` if it is not ahead.
-fn meets(shape: Shape, from: Vector, ray: Vector) -> Option<f64> {
-    match shape {
-        Shape::Sphere(radius) => ball(radius, from, ray),
-        Shape::Capsule { radius, length } => {
+fn meets(form: Form, from: Vector, ray: Vector) -> Option<f64> {
+    match form {
+        Form::Sphere(radius) => ball(radius, from, ray),
+        Form::Capsule { radius, length } => {
             let ends = [0.5, -0.5].map(|end| ball(radius, along(from, -end * length, [0.0, 0.0, 1.0]), ray));
             let flat = |vector: Vector| [vector[0], vector[1], 0.0];
             let side = nearest_root(dot(flat(ray), ray), dot(flat(from), ray), dot(flat(from), from) - radius * radius);
             let side = side.filter(|far| (from[2] + far * ray[2]).abs() <= length / 2.0);
             ends.into_iter().flatten().chain(side).min_by(f64::total_cmp)
         }
-        Shape::Box(edges) => {
+        Form::Box(edges) => {
             let (mut near, mut far) = (f64::NEG_INFINITY, f64::INFINITY);
             for axis in 0..3 {
                 let [one, other] = [-0.5, 0.5].map(|half| (half * edges[axis] - from[axis]) / ray[axis]);
@@ -49,7 +50,7 @@ fn meets(shape: Shape, from: Vector, ray: Vector) -> Option<f64> {
             }
             (near <= far && near > 0.0).then_some(near)
         }
-        Shape::Plane(sides) => {
+        Form::Plane(sides) => {
             let far = -from[2] / ray[2];
             let is_on = [0, 1].iter().all(|axis| (from[*axis] + far * ray[*axis]).abs() <= sides[*axis] / 2.0);
             (far > 0.0 && ray[2] < 0.0 && is_on).then_some(far)
@@ -67,13 +68,20 @@ fn nearest_root(a: f64, b: f64, c: f64) -> Option<f64> {
     (a > 1e-12 && root >= 0.0).then(|| (-b - root.sqrt()) / a).filter(|far| *far > 0.0)
 }
 
+type Named<'a> = (Item, &'a Solid);
+
+fn those(snapshot: &Snapshot, is_wanted: impl Fn(Item) -> bool) -> Vec<Named<'_>> {
+    let solids = snapshot.items.iter().copied().zip(&snapshot.solids);
+    solids.filter(|(item, _)| is_wanted(*item)).collect()
+}
+
 /// The first solid that a ray meets.
-fn first<'a>(solids: &[&'a Solid], origin: Vector, ray: Vector) -> Option<(f64, &'a Solid)> {
-    let met = solids.iter().filter_map(|solid| {
+fn first<'a>(solids: &[Named<'a>], origin: Vector, ray: Vector) -> Option<(f64, Named<'a>)> {
+    let met = solids.iter().filter_map(|(item, solid)| {
         let [turn, axis @ ..] = solid.rotation;
         let back = [turn, -axis[0], -axis[1], -axis[2]];
         let from = turned(back, along(origin, -1.0, solid.position));
-        Some((meets(solid.shape, from, turned(back, ray))?, *solid))
+        Some((meets(solid.form, from, turned(back, ray))?, (*item, *solid)))
     });
     met.min_by(|one, other| one.0.total_cmp(&other.0))
 }
@@ -88,21 +96,21 @@ fn own_px(world: &World, past: &[Snapshot]) -> u32 {
     let (width, height) = (view.width, view.height_px);
     let half = (view.fovy / 2.0).to_radians().tan();
     let is_thing = |item: Item| !matches!(item, Item::Room | Item::Pane(_));
-    let things: Vec<&Solid> = now.solids.iter().filter(|solid| is_thing(solid.item)).collect();
-    let panes: Vec<&Solid> = now.solids.iter().filter(|solid| matches!(solid.item, Item::Pane(_))).collect();
+    let things = those(now, is_thing);
+    let panes = those(now, |item| matches!(item, Item::Pane(_)));
     // The things that a pane shows, with its delay.
-    let shown_in = |pane: &HungPane| -> Vec<&Solid> {
+    let shown_in = |pane: &HungPane| {
         let then = &past[past.len().saturating_sub(1 + pane.delay as usize)];
-        then.solids.iter().filter(|solid| is_thing(solid.item)).collect()
+        those(then, is_thing)
     };
-    let shown: Vec<Vec<&Solid>> = world.scene().panes.iter().map(shown_in).collect();
+    let shown: Vec<Vec<Named<'_>>> = world.scene().panes.iter().map(shown_in).collect();
     let mut count = 0;
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let u = (2.0 * (f64::from(x) + 0.5) / f64::from(width) - 1.0) * half * f64::from(width) / f64::from(height);
         let v = (1.0 - 2.0 * (f64::from(y) + 0.5) / f64::from(height)) * half;
         let ray = along(along(ahead, u, right), v, up);
-        let Some((far, glass)) = first(&panes, eye.position, ray) else { continue };
-        let Item::Pane(at) = glass.item else { continue };
+        let Some((far, (item, glass))) = first(&panes, eye.position, ray) else { continue };
+        let Item::Pane(at) = item else { continue };
         let pane = &world.scene().panes[at];
         if pane.kind == PaneKind::Window || pane.double.is_some() {
             continue;
@@ -113,12 +121,12 @@ fn own_px(world: &World, past: &[Snapshot]) -> u32 {
         let normal = turned(glass.rotation, [0.0, 0.0, 1.0]);
         let reflected = along(ray, -2.0 * dot(ray, normal), normal);
         let met = first(&shown[at], along(eye.position, far, ray), reflected);
-        let is_own = |solid: &Solid| match solid.item {
+        let is_own = |item: Item| match item {
             Item::Agent(agent) => agent == 0,
             Item::Mark(mark) => world.scene().marks[mark].wearer == 0,
             _ => false,
         };
-        count += u32::from(met.is_some_and(|(_, solid)| is_own(solid)));
+        count += u32::from(met.is_some_and(|(_, (item, _))| is_own(item)));
     }
     count
 }
@@ -132,6 +140,10 @@ fn compare(shape: Body, views: usize) {
     for (name, seed) in (1..).flat_map(|seed| names.map(|name| (name, seed))) {
         let scene = Scene::draw(&config, Experiment::parse(name).unwrap(), seed, 1).unwrap();
         let mut world = World::new(&config, scene).unwrap();
+        // Few walks from a scene's own start come before the mirror.
+        face_mirror(&mut world, 2.5, 0);
+        let placed = world.figures()[0];
+        world.place_at(placed, 1);
         let mut past = vec![world.snapshot()];
         for t in 1..=24 {
             let visibility = world.visibility();

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use indexmap::IndexMap;
+use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_figures::Input;
@@ -81,6 +82,7 @@ pub fn paper() -> Cast {
         key: vec![KeyValue::Text(experiment), KeyValue::Text(model)],
         episodes: 21,
         moments,
+        repeats: false,
     });
     Cast::new(cells(groups.collect()))
 }
@@ -103,7 +105,7 @@ pub fn made_up(models: &[String]) -> Cast {
                 rate(successes, finished),
             ];
             let key = vec![KeyValue::Text((*experiment).to_owned()), KeyValue::Text(model.clone())];
-            groups.push(Group { key, episodes: 21, moments });
+            groups.push(Group { key, episodes: 21, moments, repeats: false });
         }
     }
     groups.sort_by(|a, b| a.key.cmp(&b.key));
@@ -138,6 +140,7 @@ fn catalog() -> Catalog {
         title: name.to_owned(),
         kind: if name == "TTD" { Kind::Quantity } else { Kind::Rate },
         unit: String::new(),
+        decimals: 0,
         better: if matches!(name, "TTD" | "CR") { Better::Lower } else { Better::Higher },
         section: String::new(),
         help: String::new(),
@@ -156,7 +159,7 @@ fn catalog() -> Catalog {
         let experiment = Experiment {
             title: (*title).to_owned(),
             order: i64::try_from(at).unwrap(),
-            chance: IndexMap::from([("TSA".to_owned(), chance)]),
+            chance: IndexMap::from([("TSA".to_owned(), chance.map(Chance::Of))]),
             reference: IndexMap::from([("TSA".to_owned(), levels)]),
             is_declared: false,
             control: None,
@@ -170,6 +173,7 @@ fn catalog() -> Catalog {
         values: doses.map(|(name, dose)| (name.to_owned(), dose)).into(),
     };
     Catalog {
+        columns: IndexMap::new(),
         name: "test".to_owned(),
         domain: None,
         hash: "0".repeat(64),

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use mirrorstats_analysis::statistics::{Options, Statistics};
-use mirrorstats_figures::FigureName;
+use mirrorstats_figures::{Figure, FigureName};
 use mirrorstats_report::bundle::{InputFile, Manifest};
-use mirrorstats_report::html::{self, EmbeddedFigure, HtmlError, Page, Recordings};
+use mirrorstats_report::html::{self, HtmlError, Page, Recordings};
 use mirrorstats_report::layout;
 use mirrorstats_report::layout::MetricTable;
 use mirrorstats_report::style::Style;
@@ -38,8 +38,7 @@ pub struct Report {
     pub manifest: Manifest,
     pub statistics: Option<Statistics>,
     pub recordings: Recordings,
-    /// Name, caption and picture.
-    pub figures: Vec<(FigureName, String, String)>,
+    pub figures: Vec<(FigureName, Figure)>,
 }
 
 impl Report {
@@ -73,29 +72,20 @@ impl Report {
         let drawn = FigureName::ALL
             .into_iter()
             .filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes | FigureName::DoseResponse));
-        let picture = |name| {
-            let drawn = mirrorstats_figures::draw(name, &input).unwrap();
-            (name, drawn.caption().to_owned(), drawn.inline_svg())
-        };
-        report.figures = drawn.map(picture).collect();
+        report.figures = drawn.map(|name| (name, mirrorstats_figures::draw(name, &input).unwrap())).collect();
         report
     }
 
     pub fn render(&self) -> Result<String, HtmlError> {
-        let figures: Vec<EmbeddedFigure<'_>> = self.figures.iter().map(figure).collect();
         html::render(&Page {
             tables: &self.tables,
             cells: &self.cells,
             episodes: &self.episodes,
             manifest: &self.manifest,
-            figures: &figures,
+            figures: &self.figures,
             statistics: self.statistics.as_ref(),
             lists: &[],
             recordings: Some(&self.recordings),
         })
     }
-}
-
-fn figure((name, caption, svg): &(FigureName, String, String)) -> EmbeddedFigure<'_> {
-    EmbeddedFigure { name: name.name(), title: name.title(), caption, svg }
 }

@@ -79,6 +79,7 @@ fn find_cells() -> Cells {
         key: vec![KeyValue::Text(experiment), KeyValue::Text(model)],
         episodes: EPISODES,
         moments: metrics.iter().map(|metric| moments[metric]).collect(),
+        repeats: false,
     };
     Cells {
         by: vec!["experiment".to_owned(), "model".to_owned()],
@@ -139,6 +140,7 @@ pub fn metric_of(kind: Kind, better: Better, when: Option<String>, se: StandardE
         title: String::new(),
         kind,
         unit: String::new(),
+        decimals: 0,
         better,
         section: String::new(),
         help: String::new(),

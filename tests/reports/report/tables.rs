@@ -70,6 +70,7 @@ fn cells(by: &[&str], catalog: Catalog, groups: &[RowOf]) -> Cells {
                 key: key.to_vec(),
                 episodes,
                 moments: of.iter().map(moments).collect(),
+                repeats: false,
             })
             .collect(),
         catalog,

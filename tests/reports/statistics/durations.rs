@@ -35,7 +35,7 @@ fn chance_is_tested_among_finished_episodes_too() {
             |other: &&mirrorstats_analysis::statistics::ChanceRow| (&other.key, other.level) == (&row.key, row.level);
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)
     });
-    assert_eq!((of("TSA").count(), changed.count()), (32, 6));
+    assert_eq!((of("TSA").count(), changed.count()), (32, 5));
     let text = found.render(&["TSA".to_owned()], Length::Short, None);
     assert!(text.contains("TSA     chance 1/3") && text.contains("TSA-C   chance 1/3"), "{text}");
 }

@@ -31,9 +31,9 @@ fn the_first_screen_says_what_happened() {
     let mut browser = at(&server, &format!("?view=episode&id={EPISODE}"), 1400);
     until(&mut browser, "document.querySelector('svg.map .cube') && document.querySelector('img.frame').complete");
     let verdict = browser.text("document.querySelector('.headline .verdict').textContent");
-    assert_eq!(verdict, "chose brown, is green: wrong at t = 3; never saw the mirror");
+    assert_eq!(verdict, "chose brown, is brown: right at t = 2; never saw the mirror");
     assert!(
-        browser.text("document.querySelector('.clock').textContent").starts_with("t = 3 "),
+        browser.text("document.querySelector('.clock').textContent").starts_with("t = 2 "),
         "opened at the decision"
     );
     // All of it is inside the window.
@@ -61,7 +61,7 @@ fn the_first_screen_says_what_happened() {
     assert!(keys.iter().any(|key| key.contains("turn left") && key.contains("done")), "{keys:?}");
     let names = browser
         .texts("[...document.querySelectorAll('.strip canvas')].map((canvas) => canvas.getAttribute('aria-label'))");
-    assert!(names.iter().any(|name| name == "Cube: brown t = 3"), "{names:?}");
+    assert!(names.iter().any(|name| name == "Cube: brown t = 2"), "{names:?}");
     assert!(names.iter().any(|name| name == "Mirror evidence: at no step"), "{names:?}");
     browser.close();
 }
@@ -81,6 +81,30 @@ fn a_map_is_never_empty() {
     assert_eq!(browser.value("window.empty"), 0);
     let body = "[...document.querySelectorAll('svg.map .self')].some((body) => parseFloat(getComputedStyle(body).strokeWidth) > 0)";
     assert!(browser.holds(body), "a body has an edge, whatever its colour");
+    browser.close();
+}
+
+#[cfg(feature = "sim")]
+#[test]
+fn the_map_has_the_room_its_bodies_and_the_field_of_view_even_without_a_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let mut browser = at(&server, "?view=episode&id=E4/oracle/s1/r1&t=1", 1400);
+    until(&mut browser, "document.querySelector('svg.map .cube')");
+    for (kind, least) in [("wall", 4), ("mirror", 1), ("cube", 3), ("other", 1), ("self", 1), ("cone", 1)] {
+        let count = browser.value(&format!("document.querySelectorAll('svg.map .{kind}').length"));
+        assert!(count.as_u64().is_some_and(|count| count >= least), "{kind}: {count}");
+    }
+    let keys = browser.texts("[...document.querySelectorAll('.legend li')].map((item) => item.textContent)");
+    for words in ["wall", "mirror", "cube", "itself", "another body", "field of view, 125 degrees"] {
+        assert!(keys.iter().any(|key| key == words), "{words}: {keys:?}");
+    }
+    // The cone turns with the agent: the first step of this episode is a turn.
+    let cone = "document.querySelector('svg.map .cone').getAttribute('d')";
+    let before = browser.text(cone);
+    browser.press("ArrowRight");
+    until(&mut browser, &format!("{cone} !== {before:?}"));
+    assert!(browser.holds("document.querySelector('.clock').textContent.startsWith('t = 2 ')"));
     browser.close();
 }
 
@@ -118,7 +142,7 @@ fn an_episode_exports_as_one_standalone_file() {
     );
     assert!(browser.text("document.querySelector('.verdict').textContent").starts_with("chose brown"));
     browser.press("ArrowLeft");
-    until(&mut browser, "document.querySelector('.clock').textContent.startsWith('t = 2 ')");
+    until(&mut browser, "document.querySelector('.clock').textContent.startsWith('t = 1 ')");
     assert!(browser.holds("document.querySelector('#tabs a') === null"));
     browser.close();
 }

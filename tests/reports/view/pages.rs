@@ -177,7 +177,7 @@ fn every_model_on_one_scene_is_a_grid() {
         browser.close();
     }
     assert_eq!(told[0].len(), 7, "{told:?}");
-    assert!(told[0].iter().any(|own| own == "guesser chose brown, is green: wrong at t = 3; never saw the mirror"));
+    assert!(told[0].iter().any(|own| own == "guesser chose brown, is brown: right at t = 2; never saw the mirror"));
     assert_eq!(told[0], told[1], "the copy shows the same");
 }
 

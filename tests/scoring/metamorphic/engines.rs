@@ -9,6 +9,7 @@ use std::process::Command;
 
 use mirrorstats_metric::columns::{Column, ColumnOrigin, Columns, KnownColumn, Level, Type};
 use mirrorstats_metric::definitions::Definitions;
+use mirrorstats_metric::logical_plan::plan::Output;
 use mirrorstats_metric::sql::{self, Dialect};
 use mirrorstats_score::score_traces;
 use mirrorstats_score::tables::table::EpisodeTable;
@@ -163,9 +164,8 @@ fn outside(engine: &str, packages: &Path, dialect: Dialect, folder: &Path, cases
     let answers: Vec<Vec<Value>> = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(answers.len(), cases.len());
     let of_case = |(answers, case): (Vec<Value>, &Prepared)| {
-        let names = case.definitions[0].plan.outputs.iter().map(|output| output.name.clone());
-        let names: Vec<String> = names.collect();
-        answers.into_iter().map(|answer| of_json(&names, &answer)).collect()
+        let outputs = &case.definitions[0].plan.outputs;
+        answers.into_iter().map(|answer| of_json(outputs, &answer)).collect()
     };
     answers.into_iter().zip(cases).map(of_case).collect()
 }
@@ -187,18 +187,24 @@ fn request(case: &Prepared, dialect: Dialect) -> Value {
     json!({ "folder": case.folder, "columns": columns, "statements": statements })
 }
 
-/// Rows with an episode's five keys and its metrics; an error is a text.
-fn of_json(names: &[String], answer: &Value) -> Result<Rows, String> {
+/// Rows with an episode's five keys and its metrics; an error is a text. A metric with decimals is a double there.
+fn of_json(outputs: &[Output], answer: &Value) -> Result<Rows, String> {
+    let stored = |value: &Value, decimals: u8| {
+        let double = value.as_f64().filter(|_| decimals > 0)?;
+        format!("{:.0}", double * 10_f64.powi(decimals.into())).parse().ok()
+    };
     let rows = answer.as_array().ok_or_else(|| answer.to_string())?;
     let values = rows.iter().map(|row| {
         let row = row.as_array().unwrap();
-        assert_eq!(row.len(), names.len() + 5);
+        assert_eq!(row.len(), outputs.len() + 5);
         let value = |value: &Value| value.as_i64().or_else(|| value.as_bool().map(i64::from));
-        let values = row[5..].iter().map(|found| {
-            assert!(found.is_null() || value(found).is_some(), "{found} is no value");
-            value(found)
+        let values = row[5..].iter().zip(outputs).map(|(found, output)| {
+            let value = stored(found, output.decimals).or_else(|| value(found));
+            assert!(found.is_null() || value.is_some(), "{found} is no value");
+            value
         });
         (row[0].as_str().unwrap().to_owned(), values.collect())
     });
-    Ok(Rows { names: names.to_vec(), values: values.collect() })
+    let names = outputs.iter().map(|output| output.name.clone()).collect();
+    Ok(Rows { names, values: values.collect() })
 }

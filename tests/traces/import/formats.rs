@@ -159,7 +159,7 @@ fn evaluations_of_lerobot_have_a_row_per_episode() {
     );
     fs::write(at.join("other.json"), "{\"rows\": []}").unwrap();
     let told = run(at, &import("other.json", &["--from", "lerobot"])).refused();
-    assert!(told.contains("expected an evaluation of LeRobot") && told.contains("found neither"), "{told}");
+    assert!(told.contains("expected an evaluation of LeRobot") && told.contains("found no list `per_task`"), "{told}");
 }
 
 #[test]

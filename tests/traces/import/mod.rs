@@ -5,6 +5,7 @@ mod formats;
 mod inspect;
 #[cfg(feature = "polars")]
 mod inspect_samples;
+mod mappings;
 mod palette;
 mod refusals;
 mod round_trip;

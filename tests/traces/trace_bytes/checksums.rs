@@ -9,9 +9,9 @@ use mirrorstats_score::score_traces::{self, Request};
 use mirrorstats_trace::diagnostic::{Code, Finding};
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::read::verify::verify_pages;
-use mirrorstats_trace::write::merge;
 
 use crate::harness::files;
 use crate::harness::program::program;
@@ -137,7 +137,7 @@ fn every_reader_finds_every_page_with_a_wrong_checksum() {
             fs::write(&path, bytes).unwrap();
             let finding = verified(&path).unwrap_err();
             assert_eq!(finding.column.as_ref(), Some(&page.column));
-            let merged = merge::read(&path).unwrap_err().to_string();
+            let merged = episode_rows::read(&path).unwrap_err().to_string();
             assert!(merged.contains("CRC-32") && merged.contains(&page.column), "{name}, {page:?}: {merged}");
             if mirrorstats_trace::schema::column(&page.column).is_none() {
                 // A column outside the schema, which `validate` does not read.

@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use mirrorstats_trace::diagnostic::Severity;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows;
 use mirrorstats_trace::validate::validate;
-use mirrorstats_trace::write::merge;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::{Compression, ZstdLevel};
@@ -112,7 +112,7 @@ fn is_valid(path: &Path) -> bool {
 }
 
 fn values(path: &Path) -> Option<Vec<Episode>> {
-    merge::read(path).ok()?.iter().map(|rows| rows.episode().ok()).collect()
+    episode_rows::read(path).ok()?.iter().map(|rows| rows.episode().ok()).collect()
 }
 
 fn recorded() -> Vec<u8> {

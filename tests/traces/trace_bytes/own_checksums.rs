@@ -11,6 +11,7 @@ use mirrorstats_trace::episodes::episode::{Action, Episode, Extra, Step};
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::footers::checksums::Checksums;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows;
 use mirrorstats_trace::read::open::{TraceFile, TraceSet};
 use mirrorstats_trace::read::verify::verify_pages;
 use mirrorstats_trace::scan::Projection;
@@ -92,7 +93,7 @@ fn every_way_to_read_a_column_checks_its_chunk() {
             let is_told = |told: &str| told.contains("CRC-32") && told.contains(&format!("`{}`", page.column));
             let verified = verify_pages(&traces::open(&[&path])).unwrap_err().to_string();
             assert!(is_told(&verified), "{verified}");
-            let merged = merge::read(&path).unwrap_err().to_string();
+            let merged = episode_rows::read(&path).unwrap_err().to_string();
             assert!(merged.contains("CRC-32"), "{merged}");
             let found = findings(&path);
             assert!(found.iter().any(|finding| finding.code == Code::CorruptData && is_told(&finding.to_string())));
@@ -189,7 +190,7 @@ fn checksums_that_another_program_carried_along_do_not_apply() {
     assert_eq!(findings(&own), []);
     // After writing it again, the file is this program's own.
     let anew = folder.path().join("anew.parquet");
-    merge::write(&anew, None, &merge::read(&other).unwrap()).unwrap();
+    merge::write(&anew, None, &episode_rows::read(&other).unwrap()).unwrap();
     assert_eq!((state(&anew), findings(&anew)), (Checksums::Present, Vec::new()));
     let info = run(folder.path(), &["trace", "info", "--json", "own.parquet"]).json();
     assert_eq!(info["files"][0]["checksums"], "present");
@@ -259,7 +260,7 @@ fn invalid_checksums_are_refused() {
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].code, Code::InvalidMetadata, "{}", found[0]);
         assert!(found[0].to_string().contains(expected), "{value:?}: {}", found[0]);
-        assert!(merge::read(&other).is_err());
+        assert!(episode_rows::read(&other).is_err());
     }
     // The bytes are sound, but the checksums belong to other bytes.
     again(&own, &other, &created_by, |_| ());
@@ -328,7 +329,7 @@ fn an_episode_whose_rows_contradict_its_hash_is_refused() {
         episodes().into_iter().map(|episode| Episode { episode_hash: Some("any".into()), ..episode }).collect();
     write_trace(&path, &all, columns);
     assert_eq!(findings(&path), []);
-    let kept: Vec<_> = merge::read(&path).unwrap().iter().map(|rows| rows.stated_hash().unwrap()).collect();
+    let kept: Vec<_> = episode_rows::read(&path).unwrap().iter().map(|rows| rows.stated_hash().unwrap()).collect();
     assert!(kept.iter().all(|hash| hash.len() == 64) && kept[0] != kept[1]);
     let rows = traces::rows(&path);
     let replaced = |name: &str, values: ArrayRef| {

@@ -1,15 +1,18 @@
 //! The messages to a program or a function in one episode: the words and the frame that a model gets.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
 use super::Images;
-use super::message::{Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
+use super::message::{EndMessage, Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
+use super::said::without;
 use crate::prompt::{self, Prompt, Rendered};
 use crate::reply::{self, Ending};
-use crate::{Lost, Observation, Reply, Task, Usage};
+use crate::secrets::Secret;
+use crate::{Ended, Lost, Observation, Reply, Task, Usage};
 use mirrorstats_exact::replace::TemporaryFolder;
 
 #[derive(Debug)]
@@ -17,13 +20,20 @@ pub(crate) struct Conversation {
     task: Task,
     episode_id: String,
     prompt: Prompt,
-    /// The folder of the frames, if they are files.
     frames: Option<TemporaryFolder>,
+    secrets: Arc<[Secret]>,
+    /// The last step that was asked for.
+    pub steps: i32,
 }
 
 impl Conversation {
-    /// The conversation of an episode; frame files are below `scratch`.
-    pub(crate) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
+    pub(crate) fn new(
+        task: Task,
+        episode_id: &str,
+        images: Images,
+        scratch: &Path,
+        secrets: &Arc<[Secret]>,
+    ) -> Result<Self, Lost> {
         let prompt = Prompt::for_experiment(&task.experiment).map_err(Lost::unobservable)?;
         let frames = match images {
             Images::Path => {
@@ -32,11 +42,13 @@ impl Conversation {
             }
             Images::Base64 => None,
         };
-        Ok(Self { task, episode_id: episode_id.to_owned(), prompt, frames })
+        let (episode_id, secrets) = (episode_id.to_owned(), Arc::clone(secrets));
+        Ok(Self { task, episode_id, prompt, frames, secrets, steps: 0 })
     }
 
     /// The task, only before the first observation, and the observation.
-    pub(crate) fn messages(&self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
+    pub(crate) fn messages(&mut self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
+        self.steps = observation.t;
         let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(Lost::unobservable)?;
         let task = (observation.t == 1).then(|| self.task_message(system));
         Ok((task, self.observation_message(observation, user)?))
@@ -77,12 +89,20 @@ impl Conversation {
         }))
     }
 
-    pub(crate) fn read(&self, text: String, usage: Usage) -> Reply {
-        reply::read(&text, &self.task.experiment, Ending::Whole).with_text(text, usage)
+    pub(crate) fn end(&self, reason: Ended) -> Message {
+        Message::End(EndMessage { reason, steps: self.steps })
+    }
+
+    pub(crate) fn read(&self, text: &str, ending: Ending, usage: Usage) -> Reply {
+        let text = self.without_secrets(text);
+        reply::read(&text, &self.task.experiment, ending).with_text(text, usage)
+    }
+
+    pub(crate) fn without_secrets(&self, text: &str) -> String {
+        without(&self.secrets, text)
     }
 }
 
-/// Writes a frame as a file; returns its path.
 fn kept(folder: &Path, t: i32, png: &[u8]) -> Result<String, Lost> {
     let path = folder.join(format!("{t:03}.png"));
     std::fs::write(&path, png).map_err(Lost::unobservable)?;

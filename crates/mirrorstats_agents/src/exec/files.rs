@@ -61,13 +61,11 @@ fn without_operators(word: &str) -> (&str, bool) {
     (bare, word.ends_with([';', '&', '|']))
 }
 
-/// Returns true if the next word is a redirection target.
 fn is_redirection(word: &str) -> bool {
     let operator = word.trim_start_matches(|c: char| c.is_ascii_digit() || c == '&');
     matches!(operator, ">" | ">>" | ">|")
 }
 
-/// Returns true if a word before a command sets a variable for it.
 fn is_assignment(word: &str) -> bool {
     let is_name = |name: &str| name.chars().all(|c| c == '_' || c.is_ascii_alphanumeric());
     word.split_once('=').is_some_and(|(name, _)| !name.is_empty() && is_name(name))

@@ -1,14 +1,5 @@
 //! Agents that are external programs: any command that reads and writes JSON lines.
 //!
-//! | file | what it knows |
-//! |---|---|
-//! | [`message`] | the lines to a program |
-//! | `conversation` | the lines of an episode, and the reading of replies |
-//! | [`program`] | running it, and its failures |
-//! | [`said`] | its standard error |
-//! | [`group`] | the cleanup of its processes |
-//! | [`files`] | the files that the command names, by content |
-//!
 //! One process plays one episode. Its replies are read like a model's: any other text than the requested object is no
 //! decision. A program that ends, hangs or speaks out of turn loses its episode, like a broken network.
 //!
@@ -29,9 +20,10 @@ use std::time::{Duration, Instant};
 use self::conversation::Conversation;
 use self::files::Unreadable;
 use self::group::Groups;
-use self::message::{EndMessage, Message, PROTOCOL};
+use self::message::PROTOCOL;
 use self::program::{Program, ProgramFailure};
 use self::said::Kept;
+use super::reply::Ending;
 use super::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage};
 use mirrorstats_exact::{hash, names};
@@ -52,7 +44,6 @@ names!(Images { Path: "path", Base64: "base64" });
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExecSettings {
     pub model: String,
-    /// The command, in shell syntax.
     pub command: String,
     pub images: Images,
     /// The time limit of a reply; for the first reply it includes the program's start.
@@ -107,11 +98,11 @@ impl Player for Exec {
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let shared = Arc::clone(&self.shared);
         let ExecSettings { images, scratch, .. } = &shared.settings;
-        let conversation = Conversation::new(task, episode_id, *images, scratch)?;
+        let conversation = Conversation::new(task, episode_id, *images, scratch, &shared.secrets)?;
         let kept = Kept::new(&shared.settings.standard_error, episode_id, Arc::clone(&shared.secrets));
         let program = Program::start(&shared.settings.command, &shared.groups, &kept.said);
         let program = program.map_err(|failure| lost(&failure))?;
-        Ok(Box::new(ExecAgent { shared, conversation, program: Some(program), kept, steps: 0 }))
+        Ok(Box::new(ExecAgent { shared, conversation, program: Some(program), kept }))
     }
 
     fn waits(&self) -> bool {
@@ -134,7 +125,6 @@ struct ExecAgent {
     /// `None` once it is unusable.
     program: Option<Program>,
     kept: Kept,
-    steps: i32,
 }
 
 impl Agent for ExecAgent {
@@ -143,10 +133,9 @@ impl Agent for ExecAgent {
     }
 
     fn end(&mut self, reason: Ended) -> Farewell<'_> {
-        let (program, steps) = (self.program.take(), self.steps);
         Box::pin(async move {
-            let Some(program) = program else { return };
-            if let Ok(line) = Message::End(EndMessage { reason, steps }).line() {
+            let Some(program) = self.program.take() else { return };
+            if let Ok(line) = self.conversation.end(reason).line() {
                 program.end(Some(&line)).await;
             }
         })
@@ -155,32 +144,23 @@ impl Agent for ExecAgent {
 
 impl ExecAgent {
     async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
-        self.steps = observation.t;
-        let (task, question) = self.lines(observation)?;
+        let (task, question) = self.conversation.messages(observation)?;
+        let task = task.map(|task| task.line()).transpose().map_err(Lost::unobservable)?;
+        let question = question.line().map_err(Lost::unobservable)?;
         let Some(program) = &mut self.program else { return Err(Lost::because("the program has ended")) };
         let start = Instant::now();
         match program.ask(task.as_deref(), &question, self.shared.settings.timeout).await {
-            Ok(line) => Ok(self.read(&line, start.elapsed())),
+            Ok(line) => Ok(self.read(&line, Usage::of_time(start.elapsed()))),
             Err(failure) => Err(self.give_up(&failure).await),
         }
     }
 
-    fn lines(&self, observation: &Observation) -> Result<(Option<Vec<u8>>, Vec<u8>), Lost> {
-        let (task, question) = self.conversation.messages(observation)?;
-        let task = task.map(|task| task.line()).transpose();
-        Ok((task.map_err(Lost::unobservable)?, question.line().map_err(Lost::unobservable)?))
-    }
-
-    fn read(&self, line: &[u8], latency: Duration) -> Reply {
-        let usage = Usage::of_time(latency);
+    fn read(&self, line: &[u8], usage: Usage) -> Reply {
         match str::from_utf8(line) {
-            Ok(text) => {
-                let text = self.shared.without_secrets(text);
-                self.conversation.read(text, usage)
-            }
+            Ok(text) => self.conversation.read(text, Ending::Whole, usage),
             // With its bytes replaced, the line might pass for something else.
             Err(fault) => Reply::without_decision(Status::ParseFailed, Some(fault.to_string()))
-                .with_text(self.shared.without_secrets(&String::from_utf8_lossy(line)), usage),
+                .with_text(self.conversation.without_secrets(&String::from_utf8_lossy(line)), usage),
         }
     }
 
@@ -192,22 +172,17 @@ impl ExecAgent {
         let words = self.kept.said.last_words(&self.shared.secrets);
         let words = words.map_or_else(String::new, |words| format!("; its last words:\n{words}"));
         // Output before the reply belongs to the previous step, though it is noticed now.
-        let earlier = matches!(failure, ProgramFailure::Chatter { .. }).then(|| self.steps - 1);
-        let step = earlier.unwrap_or(self.steps);
-        let cause = self.shared.without_secrets(&format!("step {step}: {}{words}", lost.cause));
+        let asked = self.conversation.steps;
+        let earlier = matches!(failure, ProgramFailure::Chatter { .. }).then_some(asked - 1);
+        let step = earlier.unwrap_or(asked);
+        let cause = self.conversation.without_secrets(&format!("step {step}: {}{words}", lost.cause));
         if let ProgramFailure::Ended(status) = failure
-            && self.steps == 1
+            && asked == 1
             && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
         {
             self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {cause}"));
         }
         Lost { cause, step: earlier, ..lost }
-    }
-}
-
-impl Shared {
-    fn without_secrets(&self, text: &str) -> String {
-        said::without(&self.secrets, text)
     }
 }
 

@@ -12,7 +12,6 @@ use crate::locked;
 use crate::secrets::Secret;
 use mirrorstats_exact::replace::{folder_of, make_folder, replace};
 
-/// The maximum size of an episode's file in bytes.
 pub(crate) const IN_FILE: usize = 256 * 1024;
 const IN_MESSAGE: usize = 2_000;
 /// Extra bytes before those of the file: longer than any key, since the cut may split one.

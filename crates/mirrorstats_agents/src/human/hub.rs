@@ -47,8 +47,9 @@ impl Hub {
         journal: ParticipantJournal,
         eraser: Eraser,
     ) -> Self {
-        let key = |entry: &PlayedStep| (entry.episode_id.clone(), entry.participant.clone(), entry.t);
-        let answers = journal.entries().into_iter().map(|entry| (key(&entry), entry)).collect();
+        let answer =
+            |(code, step): (&str, &PlayedStep)| ((step.episode_id.clone(), code.to_owned(), step.t), step.clone());
+        let answers = journal.answers().map(answer).collect();
         let (codes, tokens): (Vec<String>, Vec<String>) = people.into_iter().unzip();
         let seat = |code: String| Seat {
             has_agreed: journal.has_agreed(&code, terms.consent.as_deref()),
@@ -144,8 +145,8 @@ impl Hub {
         self.answers.get(&(episode_id.to_owned(), self.code(seat), t)).cloned()
     }
 
-    pub(super) fn keep(&self, entry: PlayedStep) -> io::Result<()> {
-        locked(&self.journal).keep(entry)
+    pub(super) fn keep(&self, code: &str, step: PlayedStep) -> io::Result<()> {
+        locked(&self.journal).keep(code, step)
     }
 
     /// The practice is over: the person is informed, and steps count only after the start.
@@ -183,7 +184,6 @@ impl Hub {
         self.is_stopping.load(Ordering::Relaxed)
     }
 
-    /// Ends all waiting for people, since the recording is to stop.
     pub fn interrupt(&self) {
         self.is_stopping.store(true, Ordering::Relaxed);
         (0..self.seats()).for_each(|seat| self.seat(seat).asked = None);

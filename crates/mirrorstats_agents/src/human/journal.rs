@@ -20,36 +20,36 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of the journal of partic
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlayedStep {
-    pub participant: String,
     pub episode_id: String,
-    /// The step, from 1.
     pub t: i32,
     /// From the frame to the reply, ms.
     pub latency_ms: i32,
-    /// The JSON object of the reply.
     pub reply: String,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Line {
+    participant: String,
+    #[serde(flatten)]
+    event: Event,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
-enum Line {
+enum Event {
     Answer(PlayedStep),
     /// Somebody agreed to the consent text with this hash.
     Agreed {
-        participant: String,
         consent: String,
     },
     Practised {
-        participant: String,
         practised: bool,
     },
     Left {
-        participant: String,
         left: Leaving,
     },
     /// Somebody got a link, and a position among the participants, from 1.
     Enrolled {
-        participant: String,
         place: usize,
         link: String,
     },
@@ -65,18 +65,6 @@ pub(crate) enum Leaving {
     Deleted,
 }
 
-impl Line {
-    fn participant(&self) -> &str {
-        match self {
-            Self::Answer(PlayedStep { participant, .. })
-            | Self::Agreed { participant, .. }
-            | Self::Practised { participant, .. }
-            | Self::Left { participant, .. }
-            | Self::Enrolled { participant, .. } => participant,
-        }
-    }
-}
-
 #[derive(Debug)]
 pub struct ParticipantJournal {
     /// The folder; `None` without a recording. The file is opened per line, since `participants remove` replaces it.
@@ -87,7 +75,7 @@ pub struct ParticipantJournal {
 impl ParticipantJournal {
     pub fn open(folder: &Path) -> io::Result<Self> {
         replace::make_folder(folder)?;
-        let path = path(folder);
+        let path = folder.join(NAME);
         let lines = json_lines::read(&path, LONGEST_LINE)?;
         let mut file = appending(&path)?;
         if !lines.is_empty() {
@@ -101,98 +89,94 @@ impl ParticipantJournal {
         Self { folder: None, lines: Vec::new() }
     }
 
-    /// The answers that existed when it was opened.
-    pub fn entries(&self) -> Vec<PlayedStep> {
-        let answer = |line: &Line| if let Line::Answer(entry) = line { Some(entry.clone()) } else { None };
-        self.lines.iter().filter_map(answer).collect()
-    }
-
-    pub(super) fn has_agreed(&self, code: &str, words: Option<&str>) -> bool {
-        let own = words.map(|words| hash::of_bytes(words.as_bytes()));
-        self.lines.iter().any(|line| {
-            matches!(line, Line::Agreed { participant, consent } if participant == code && Some(consent) == own.as_ref())
-        })
-    }
-
-    pub(super) fn has_practised(&self, code: &str) -> bool {
-        self.lines.iter().any(|line| matches!(line, Line::Practised { participant, .. } if participant == code))
-    }
-
-    pub(super) fn keep(&self, entry: PlayedStep) -> io::Result<()> {
-        self.write(&Line::Answer(entry))
-    }
-
-    pub(super) fn agreed(&self, code: &str, words: &str) -> io::Result<()> {
-        let consent = hash::of_bytes(words.as_bytes());
-        self.write(&Line::Agreed { participant: code.to_owned(), consent })
-    }
-
-    pub(super) fn practised(&self, code: &str) -> io::Result<()> {
-        self.write(&Line::Practised { participant: code.to_owned(), practised: true })
-    }
-
-    pub(super) fn left(&self, code: &str) -> Option<Leaving> {
-        self.lines.iter().rev().find_map(|line| match line {
-            Line::Left { participant, left } if participant == code => Some(*left),
+    /// The answers that existed when it was opened, with the codes of their participants.
+    pub(super) fn answers(&self) -> impl Iterator<Item = (&str, &PlayedStep)> {
+        self.lines.iter().filter_map(|line| match &line.event {
+            Event::Answer(step) => Some((line.participant.as_str(), step)),
             _ => None,
         })
     }
 
-    pub(super) fn leave(&self, code: &str, left: Leaving) -> io::Result<()> {
-        self.write(&Line::Left { participant: code.to_owned(), left })
+    fn events(&self, code: &str) -> impl Iterator<Item = &Event> {
+        self.lines.iter().filter(move |line| line.participant == code).map(|line| &line.event)
+    }
+
+    pub(super) fn has_agreed(&self, code: &str, words: Option<&str>) -> bool {
+        let own = words.map(|words| hash::of_bytes(words.as_bytes()));
+        self.events(code).any(|event| matches!(event, Event::Agreed { consent } if Some(consent) == own.as_ref()))
+    }
+
+    pub(super) fn has_practised(&self, code: &str) -> bool {
+        self.events(code).any(|event| matches!(event, Event::Practised { .. }))
+    }
+
+    pub(super) fn left(&self, code: &str) -> Option<Leaving> {
+        let left = |event: &Event| if let Event::Left { left } = event { Some(*left) } else { None };
+        self.events(code).filter_map(left).last()
     }
 
     /// The position among the participants and the link of a person, if enrolled.
     pub fn enrolled(&self, code: &str) -> Option<(usize, &str)> {
-        self.lines.iter().find_map(|line| match line {
-            Line::Enrolled { participant, place, link } if participant == code => Some((*place, link.as_str())),
+        self.events(code).find_map(|event| match event {
+            Event::Enrolled { place, link } => Some((*place, link.as_str())),
             _ => None,
         })
     }
 
     pub fn enrol(&self, code: &str, place: usize, link: &str) -> io::Result<()> {
-        self.write(&Line::Enrolled { participant: code.to_owned(), place, link: link.to_owned() })
+        self.write(code, Event::Enrolled { place, link: link.to_owned() })
+    }
+
+    pub(super) fn keep(&self, code: &str, step: PlayedStep) -> io::Result<()> {
+        self.write(code, Event::Answer(step))
+    }
+
+    pub(super) fn agreed(&self, code: &str, words: &str) -> io::Result<()> {
+        self.write(code, Event::Agreed { consent: hash::of_bytes(words.as_bytes()) })
+    }
+
+    pub(super) fn practised(&self, code: &str) -> io::Result<()> {
+        self.write(code, Event::Practised { practised: true })
+    }
+
+    pub(super) fn leave(&self, code: &str, left: Leaving) -> io::Result<()> {
+        self.write(code, Event::Left { left })
     }
 
     /// Removes a person's answers; their withdrawal, position and link stay. Returns the folder, if there is one.
     pub(super) fn forget(&self, code: &str) -> io::Result<Option<PathBuf>> {
         let Some(folder) = &self.folder else { return Ok(None) };
         let stays =
-            |line: &Line| line.participant() != code || matches!(line, Line::Left { .. } | Line::Enrolled { .. });
-        keep(&path(folder), stays)?;
+            |line: &Line| line.participant != code || matches!(line.event, Event::Left { .. } | Event::Enrolled { .. });
+        keep(folder, stays)?;
         Ok(Some(folder.clone()))
     }
 
-    fn write(&self, line: &Line) -> io::Result<()> {
+    fn write(&self, code: &str, event: Event) -> io::Result<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        let mut file = appending(&path(folder))?;
-        file.write_all(&json_lines::line(line)?)?;
+        let mut file = appending(&folder.join(NAME))?;
+        file.write_all(&json_lines::line(&Line { participant: code.to_owned(), event })?)?;
         file.sync_data()
     }
 }
 
-/// Removes all of a person's lines from a folder's journal; returns their number.
 pub fn remove(folder: &Path, code: &str) -> io::Result<usize> {
-    keep(&path(folder), |line| line.participant() != code)
+    keep(folder, |line| line.participant != code)
 }
 
-/// Keeps some lines of a journal; returns the number of removed lines.
-fn keep(path: &Path, stays: impl Fn(&Line) -> bool) -> io::Result<usize> {
-    let lines: Vec<Line> = json_lines::read(path, LONGEST_LINE)?;
+fn keep(folder: &Path, stays: impl Fn(&Line) -> bool) -> io::Result<usize> {
+    let path = folder.join(NAME);
+    let lines: Vec<Line> = json_lines::read(&path, LONGEST_LINE)?;
     let kept: Vec<&Line> = lines.iter().filter(|line| stays(line)).collect();
     let removed = lines.len() - kept.len();
     if removed > 0 {
-        json_lines::replace(path, &kept)?;
+        json_lines::replace(&path, &kept)?;
     }
     Ok(removed)
 }
 
 fn appending(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).create(true).open(path)
-}
-
-fn path(folder: &Path) -> PathBuf {
-    folder.join(NAME)
 }
 
 #[cfg(test)]
@@ -202,26 +186,21 @@ mod tests {
     #[test]
     fn answers_come_back_and_a_person_can_be_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let entry = |participant: &str, t| PlayedStep {
-            participant: participant.to_owned(),
-            episode_id: "E1/human/s1/r1".to_owned(),
-            t,
-            latency_ms: 5,
-            reply: "{}".to_owned(),
-        };
+        let step = |t| PlayedStep { episode_id: "E1/human/s1/r1".to_owned(), t, latency_ms: 5, reply: "{}".to_owned() };
         let journal = ParticipantJournal::open(folder.path()).unwrap();
         journal.agreed("P1", "words").unwrap();
-        journal.keep(entry("P1", 1)).unwrap();
+        journal.keep("P1", step(1)).unwrap();
         journal.practised("P2").unwrap();
-        journal.keep(entry("P2", 2)).unwrap();
+        journal.keep("P2", step(2)).unwrap();
         drop(journal);
         let journal = ParticipantJournal::open(folder.path()).unwrap();
-        assert_eq!(journal.entries(), [entry("P1", 1), entry("P2", 2)]);
+        assert_eq!(journal.answers().collect::<Vec<_>>(), [("P1", &step(1)), ("P2", &step(2))]);
         assert!(journal.has_agreed("P1", Some("words")) && !journal.has_agreed("P1", Some("other words")));
         assert!(journal.has_practised("P2") && !journal.has_practised("P1"));
         assert_eq!(remove(folder.path(), "P1").unwrap(), 2);
         assert!(!std::fs::read_to_string(folder.path().join("participants.jsonl")).unwrap().contains("P1"));
-        assert_eq!(ParticipantJournal::open(folder.path()).unwrap().entries(), [entry("P2", 2)]);
+        let journal = ParticipantJournal::open(folder.path()).unwrap();
+        assert_eq!(journal.answers().collect::<Vec<_>>(), [("P2", &step(2))]);
     }
 
     #[test]

@@ -1,13 +1,5 @@
 //! A person as the agent: the same frame, words and reply as for a model, in a browser.
 //!
-//! | file | what it knows |
-//! |---|---|
-//! | [`design`] | the distribution and order of episodes |
-//! | [`hub`] | the participants, their open questions, and withdrawals |
-//! | [`seat`] | one person: question, clock, and content of the page |
-//! | [`server`] | the pages for participants, and nothing else |
-//! | [`journal`] | the answers, so that an interrupted recording continues in the middle of an episode |
-//!
 //! Rule: a person gets what a model gets and nothing else: no body colour, no pixel count, no id. Each person has a
 //! link and a code; no other personal data is stored.
 
@@ -27,7 +19,7 @@ use self::seat::{Given, PlayerQuestion};
 use self::server::Server;
 use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
-use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Task, Usage, locked};
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Person, Player, Reply, Task, Usage, locked};
 use mirrorstats_exact::hash;
 
 const PROTOCOL: u32 = 3;
@@ -134,8 +126,14 @@ impl Agent for HumanAgent {
         Box::pin(std::future::ready(()))
     }
 
-    fn participant(&self) -> Option<&str> {
-        Some(&self.code)
+    fn person(&mut self) -> Option<&mut dyn Person> {
+        Some(self)
+    }
+}
+
+impl Person for HumanAgent {
+    fn code(&self) -> &str {
+        &self.code
     }
 
     fn wants_practice(&self) -> bool {
@@ -171,9 +169,9 @@ impl HumanAgent {
         let gone = || if self.hub.is_stopping() { Lost::by_stop() } else { Lost::by_leaving() };
         let Given { reply, latency_ms } = given.ok_or_else(gone)?;
         if !is_practice {
-            let (participant, episode_id) = (self.code.clone(), self.episode_id.clone());
-            let entry = PlayedStep { participant, episode_id, t: observation.t, latency_ms, reply: reply.clone() };
-            self.hub.keep(entry).map_err(|error| Lost::because(format!("the journal cannot be written: {error}")))?;
+            let (episode_id, reply) = (self.episode_id.clone(), reply.clone());
+            let kept = self.hub.keep(&self.code, PlayedStep { episode_id, t: observation.t, latency_ms, reply });
+            kept.map_err(|error| Lost::because(format!("the journal cannot be written: {error}")))?;
         }
         Ok(read(&reply, task, latency_ms))
     }

@@ -10,8 +10,8 @@ use tokio::sync::oneshot;
 use super::journal::Leaving;
 use crate::milliseconds;
 use mirrorstats_experiment::Experiment;
-use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::frame::Frame;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The maximum time between two polls of an open page.
 pub(super) const LISTENING: Duration = Duration::from_secs(3);
@@ -24,7 +24,6 @@ pub struct PlayerQuestion {
     pub frame: Arc<Frame>,
     pub system: String,
     pub user: String,
-    /// The step, from 1.
     pub t: i32,
     pub(crate) is_practice: bool,
     pub experiment: Experiment,
@@ -34,7 +33,6 @@ pub struct PlayerQuestion {
 
 #[derive(Debug)]
 pub struct Given {
-    /// The JSON object of a reply.
     pub reply: String,
     /// From the frame to the reply, ms; breaks and times without the page do not count.
     pub latency_ms: i32,

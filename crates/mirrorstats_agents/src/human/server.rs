@@ -9,7 +9,8 @@ use std::thread::JoinHandle;
 
 use axum::Router;
 use axum::body::Bytes;
-use axum::extract::{DefaultBodyLimit, Query, State};
+use axum::extract::{DefaultBodyLimit, FromRequestParts, Query};
+use axum::http::request::Parts;
 use axum::http::{StatusCode, header};
 use axum::middleware::map_response;
 use axum::response::{IntoResponse, Response};
@@ -26,7 +27,6 @@ const BODY: &str = include_str!("../../../../assets/player/body.html");
 const STYLE: &str = include_str!("../../../../assets/player/player.css");
 const SCRIPT: &str = include_str!("../../../../assets/player/player.js");
 
-/// The maximum size of a reply in bytes.
 const LONGEST: usize = 1 << 20;
 
 #[derive(Debug, Deserialize)]
@@ -77,23 +77,22 @@ pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Res
 }
 
 fn routes(hub: Arc<Hub>) -> Router {
+    let page = || file(mirrorstats_web::page("Mirror room", "player.css", BODY), "text/html; charset=utf-8");
     Router::new()
-        .route(
-            "/",
-            get(|| async {
-                file(mirrorstats_web::page("Mirror room", "player.css", BODY), "text/html; charset=utf-8")
-            }),
-        )
+        .route("/", get(move || async move { page() }))
         .route("/player.css", get(|| async { file(STYLE, "text/css; charset=utf-8") }))
         .route("/player.js", get(|| async { file(SCRIPT, "text/javascript; charset=utf-8") }))
-        .route("/state", get(|hub, link| async { state_after(hub, link, |_, _| ()) }))
+        .route("/state", get(|person: LinkHolder| async move { person.state() }))
         .route("/frame", get(frame))
         .route("/agree", post(agree))
-        .route("/decline", post(|State(hub), Query(link)| leave(hub, link, Leaving::Declined)))
+        .route("/decline", post(|person: LinkHolder| person.leave(Leaving::Declined)))
         .route("/withdraw", post(withdraw))
-        .route("/begin", post(|hub, link| async { state_after(hub, link, Hub::begin) }))
-        .route("/pause", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.seat(seat).pause(true)) }))
-        .route("/resume", post(|hub, link| async { state_after(hub, link, |hub, seat| hub.seat(seat).pause(false)) }))
+        .route("/begin", post(|person: LinkHolder| async move { person.after(Hub::begin) }))
+        .route("/pause", post(|person: LinkHolder| async move { person.after(|hub, seat| hub.seat(seat).pause(true)) }))
+        .route(
+            "/resume",
+            post(|person: LinkHolder| async move { person.after(|hub, seat| hub.seat(seat).pause(false)) }),
+        )
         .route("/reply", post(reply))
         .layer(DefaultBodyLimit::max(LONGEST))
         // Pages poll constantly: a kept connection would make another page wait.
@@ -106,72 +105,74 @@ fn file(text: impl IntoResponse, kind: &'static str) -> Response {
 }
 
 fn json_response(value: &Value) -> Response {
-    ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
+    file(value.to_string(), "application/json")
 }
 
-fn for_person(hub: &Hub, link: &Link, does: impl FnOnce(usize) -> Response) -> Response {
-    match link.p.as_deref().and_then(|token| hub.seat_of(token)) {
-        Some(seat) => does(seat),
-        None => stranger(),
+/// The participant whose link a request has.
+struct LinkHolder {
+    hub: Arc<Hub>,
+    seat: usize,
+}
+
+impl FromRequestParts<Arc<Hub>> for LinkHolder {
+    type Rejection = Response;
+
+    async fn from_request_parts(parts: &mut Parts, hub: &Arc<Hub>) -> Result<Self, Response> {
+        let link = Query::<Link>::from_request_parts(parts, hub).await.map_err(IntoResponse::into_response)?;
+        let seat = link.p.as_deref().and_then(|token| hub.seat_of(token));
+        let stranger = || (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response();
+        Ok(Self { hub: Arc::clone(hub), seat: seat.ok_or_else(stranger)? })
     }
 }
 
-fn stranger() -> Response {
-    (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response()
-}
+impl LinkHolder {
+    fn state(&self) -> Response {
+        json_response(&self.hub.state(self.seat))
+    }
 
-fn state_after(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, does: fn(&Hub, usize)) -> Response {
-    for_person(&hub, &link, |seat| {
-        does(&hub, seat);
-        json_response(&hub.state(seat))
-    })
-}
+    fn after(self, does: fn(&Hub, usize)) -> Response {
+        does(&self.hub, self.seat);
+        self.state()
+    }
 
-async fn frame(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
-    for_person(&hub, &link, |seat| {
-        let frame = hub.seat(seat).frame(&hub.terms);
-        match frame.as_ref().and_then(|frame| frame.to_png().ok()) {
-            Some(png) => ([(header::CONTENT_TYPE, "image/png")], png.to_vec()).into_response(),
-            None => (StatusCode::NOT_FOUND, "no frame").into_response(),
+    /// Deletion waits for a step under way and for the disk, so it runs on a separate thread.
+    async fn leave(self, how: Leaving) -> Response {
+        let (hub, seat) = (Arc::clone(&self.hub), self.seat);
+        match tokio::task::spawn_blocking(move || hub.leave(seat, how)).await {
+            Ok(Ok(())) => self.state(),
+            _ => unwritten(),
         }
-    })
+    }
 }
 
-async fn agree(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
-    for_person(&hub, &link, |seat| match hub.agree(seat) {
-        Ok(()) => json_response(&hub.state(seat)),
-        Err(_) => unwritten(),
-    })
+async fn frame(LinkHolder { hub, seat }: LinkHolder) -> Response {
+    let frame = hub.seat(seat).frame(&hub.terms);
+    match frame.as_ref().and_then(|frame| frame.to_png().ok()) {
+        Some(png) => file(png.to_vec(), "image/png"),
+        None => (StatusCode::NOT_FOUND, "no frame").into_response(),
+    }
+}
+
+async fn agree(person: LinkHolder) -> Response {
+    if person.hub.agree(person.seat).is_ok() { person.state() } else { unwritten() }
 }
 
 fn unwritten() -> Response {
     (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response()
 }
 
-async fn withdraw(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Bytes) -> Response {
+async fn withdraw(person: LinkHolder, body: Bytes) -> Response {
     match serde_json::from_slice(&body) {
-        Ok(Withdrawal { delete: true }) => leave(hub, link, Leaving::Deleted).await,
-        Ok(Withdrawal { delete: false }) => leave(hub, link, Leaving::Stopped).await,
+        Ok(Withdrawal { delete: true }) => person.leave(Leaving::Deleted).await,
+        Ok(Withdrawal { delete: false }) => person.leave(Leaving::Stopped).await,
         Err(_) => (StatusCode::BAD_REQUEST, "no withdrawal").into_response(),
     }
 }
 
-/// Deletion waits for a step under way and for the disk, so it runs on a separate thread.
-async fn leave(hub: Arc<Hub>, link: Link, how: Leaving) -> Response {
-    let Some(seat) = link.p.as_deref().and_then(|token| hub.seat_of(token)) else { return stranger() };
-    let leaving = Arc::clone(&hub);
-    match tokio::task::spawn_blocking(move || leaving.leave(seat, how)).await {
-        Ok(Ok(())) => json_response(&hub.state(seat)),
-        _ => unwritten(),
-    }
-}
-
-async fn reply(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Bytes) -> Response {
-    for_person(&hub, &link, |seat| {
-        let Ok(Sent { number, reply }) = serde_json::from_slice(&body) else {
-            return (StatusCode::BAD_REQUEST, "no reply").into_response();
-        };
-        let taken = hub.seat(seat).answer(&hub.terms, number, Value::Object(reply).to_string());
-        json_response(&json!({ "taken": taken }))
-    })
+async fn reply(LinkHolder { hub, seat }: LinkHolder, body: Bytes) -> Response {
+    let Ok(Sent { number, reply }) = serde_json::from_slice(&body) else {
+        return (StatusCode::BAD_REQUEST, "no reply").into_response();
+    };
+    let taken = hub.seat(seat).answer(&hub.terms, number, Value::Object(reply).to_string());
+    json_response(&json!({ "taken": taken }))
 }

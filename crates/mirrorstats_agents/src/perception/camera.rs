@@ -14,7 +14,7 @@ pub(crate) const EYE_HEIGHT: f64 = 1.52;
 const EYE_AHEAD: f64 = 0.14;
 
 /// A place on the floor, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
     pub x: f64,
     pub y: f64,
@@ -33,7 +33,7 @@ impl Place {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Viewpoint {
     pub place: Place,
     pub heading: Heading,
@@ -82,7 +82,6 @@ impl ViewCamera {
         i32::from(shows(1)) + i32::from(shows(2))
     }
 
-    /// The number of pixels per metre at a distance of `ahead` metres.
     pub fn scale(&self, ahead: f64) -> f64 {
         self.focal / ahead
     }

@@ -7,7 +7,7 @@
 //!
 //! Rule: a column with paint at or above the foot is ignored.
 
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 
 use super::camera::{Place, ViewCamera};
 use super::{paint, real};
@@ -25,7 +25,6 @@ pub struct Foot {
     pub error: f64,
 }
 
-/// The feet of the walls in a picture, from left to right.
 pub fn feet(frame: &Frame, camera: &ViewCamera) -> Vec<Foot> {
     (STRIDE / 2..frame.width).step_by(STRIDE).filter_map(|column| foot(frame, camera, column)).collect()
 }

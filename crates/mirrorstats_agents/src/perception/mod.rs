@@ -17,7 +17,7 @@ pub mod things;
 use std::sync::Arc;
 
 use crate::Observation;
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 
 use camera::{ViewCamera, Viewpoint};
 use ground::Foot;

@@ -9,7 +9,7 @@
 
 use std::sync::LazyLock;
 
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The minimum and maximum light on things in a lit room.
 const LIGHT: (f64, f64) = (0.50, 1.05);

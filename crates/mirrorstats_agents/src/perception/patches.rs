@@ -2,8 +2,8 @@
 //!
 //! Rule: eight neighbours connect; patches are ordered by their first pixel, row by row, so only the picture matters.
 
-use mirrorstats_trace::episodes::frame::Frame;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::frame::Frame;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::{paint, real};
 

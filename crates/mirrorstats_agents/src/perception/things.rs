@@ -6,7 +6,7 @@
 //! Rule: a cube counts only if it is completely in view; a cropped or half-hidden one does not. The place of a thing
 //! seen in a mirror is the apparent place of its reflection.
 
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::camera::{EYE_HEIGHT, Place, ViewCamera};
 use super::patches::ColorPatch;
@@ -50,15 +50,11 @@ fn cube(patch: &ColorPatch, camera: &ViewCamera) -> Option<Thing> {
     let fall = (EYE_HEIGHT - camera.height(ahead, real(patch.top))) / ahead;
     let edge = (EYE_HEIGHT - fall * ahead) / (1.0 + fall);
     let width = real(patch.width()) / camera.scale(ahead);
-    let is_full = real(patch.pixels) >= FULLNESS * real(patch.width() * patch.height());
     let is_cube = patch.pixels >= LEAST_OF_CUBE
-        && is_full
+        && real(patch.pixels) >= FULLNESS * real(patch.width() * patch.height())
         && (EDGES.0..=EDGES.1).contains(&edge)
         && (WIDTHS.0 * edge..=WIDTHS.1 * edge).contains(&width);
-    is_cube.then(|| {
-        let place = camera.place(patch.middle(), ahead + 0.55 * edge);
-        Thing { color: patch.color, place, pixels: patch.pixels, column: patch.middle() }
-    })
+    is_cube.then(|| thing(patch, camera, ahead + 0.55 * edge))
 }
 
 /// The bodies of a picture of `width` x `height` pixels: no cubes, with limbs and trunk joined if their columns touch.
@@ -86,10 +82,10 @@ fn body(patch: &ColorPatch, camera: &ViewCamera, height: usize) -> Option<Thing>
     let is_body =
         patch.pixels >= LEAST_OF_BODY && bottom > 0.0 && top < HIGH * bottom && patch.height() > patch.width();
     let ahead = camera.floor_ahead(horizon + bottom)? + HALF_BODY;
-    is_body.then(|| Thing {
-        color: patch.color,
-        place: camera.place(patch.middle(), ahead),
-        pixels: patch.pixels,
-        column: patch.middle(),
-    })
+    is_body.then(|| thing(patch, camera, ahead))
+}
+
+fn thing(patch: &ColorPatch, camera: &ViewCamera, ahead: f64) -> Thing {
+    let column = patch.middle();
+    Thing { color: patch.color, place: camera.place(column, ahead), pixels: patch.pixels, column }
 }

@@ -4,10 +4,12 @@
 //! raw text ──► object (strict JSON, then named repairs) ──► the keys of the prompt ──► Reply
 //! ```
 //!
-//! Rule: nothing is invented. A reply is accepted unchanged, accepted after named repairs, or is no decision: then
-//! action, cube and attribution are absent, and only the raw text remains. It preserves the spelling of `selected_cube`
-//! and `identification`: letter case and white space do not matter in either and need no repair. For an action, whose
-//! letters are fixed, another spelling is a repair.
+//! Rule: the form of a reply is repaired, each repair has a name, and the meaning is never guessed. A reply is accepted
+//! unchanged, accepted after named repairs, or is no decision: then action, cube and attribution are absent, and only
+//! the raw text remains.
+//!
+//! Form is the text around the object, its container, the spelling of keys and values, and the prompt's own words for an
+//! action. `docs/how-to/models.md` lists both sides.
 //!
 //! A `selected_cube` other than `none` with an action other than `done` breaks a rule of the prompt, but the object is
 //! well-formed. It is kept as replied, and the metrics use only the cube of the `done` step.
@@ -16,9 +18,11 @@ mod object;
 mod repair;
 mod surrogates;
 mod thoughts;
+mod value;
 
 use serde_json::{Value, json};
 
+use object::Object;
 use repair::NoObject;
 pub use repair::Repair;
 #[cfg(feature = "play")]
@@ -29,11 +33,9 @@ pub use thoughts::has_object;
 use super::{Answers, Reply, Status, Usage, Words, prompt};
 use mirrorstats_experiment::Spec;
 use mirrorstats_experiment::spec::{Actions, Answer, AnswerType, ReplyKey, Side};
-use mirrorstats_trace::episodes::answers::Answered;
-use mirrorstats_trace::episodes::episode::{Action, Step};
-use mirrorstats_trace::episodes::identification;
-use mirrorstats_trace::episodes::palette::Color;
-use mirrorstats_trace::schema::colors::spelling;
+use mirrorstats_trace::episodes::episode::Step;
+use mirrorstats_trace::episodes::identification::{Reading, UNREADABLE};
+use mirrorstats_trace::schema::colors::Color;
 
 /// The end of a reply, as reported by the provider.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -48,20 +50,7 @@ pub enum Ending {
 
 impl Reply {
     pub fn without_decision(status: Status, fault: Option<String>) -> Self {
-        Self {
-            status,
-            repairs: Vec::new(),
-            fault,
-            action: None,
-            self_color: None,
-            selected_cube: None,
-            mark_report: None,
-            answers: Answers::new(),
-            words: Words::default(),
-            raw: None,
-            usage: Usage::default(),
-            model: None,
-        }
+        Self { status, fault, ..Self::default() }
     }
 
     /// Prepends the repairs of the text's container.
@@ -114,9 +103,10 @@ pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reply {
         Err(_) if is_truncated => return Reply::without_decision(Status::Truncated, None),
         Err(fault) => return without_object(fault),
     };
-    match decision(&object, experiment) {
+    match decision(object, experiment) {
         Ok(reply) => {
             repairs.extend(reply.repairs);
+            repairs.dedup();
             let status = if repairs.is_empty() { Status::Ok } else { Status::Repaired };
             Reply { status, repairs, ..reply }
         }
@@ -124,17 +114,21 @@ pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reply {
     }
 }
 
+/// The fault of an answer whose only text is the model's reasoning.
+pub const REASONING_ALONE: &str = "the answer has reasoning, but no text after it";
+
 fn without_object(fault: NoObject) -> Reply {
     let (status, fault) = match fault {
         NoObject::Unreadable(fault) => (Status::ParseFailed, Some(fault)),
         NoObject::OpenThoughts => (Status::Truncated, Some("the reply ends within its thoughts".to_owned())),
-        NoObject::ThoughtsAlone => (Status::Empty, None),
+        NoObject::ThoughtsAlone => (Status::Empty, Some(REASONING_ALONE.to_owned())),
     };
     Reply::without_decision(status, fault)
 }
 
-fn decision(object: &object::Object, experiment: &Spec) -> Result<Reply, String> {
+fn decision(mut object: Object, experiment: &Spec) -> Result<Reply, String> {
     let keys = experiment.keys();
+    let mut repairs = if object.rename_keys(&keys) { vec![Repair::KeySpelling] } else { Vec::new() };
     if let Some(key) = object.repeated_key() {
         return Err(format!("the key \"{key}\" occurs twice"));
     }
@@ -145,16 +139,19 @@ fn decision(object: &object::Object, experiment: &Spec) -> Result<Reply, String>
         _ if !experiment.reply.contains(&key) => Ok(None),
         None => Err(format!("the key \"{}\" is missing", key.name())),
         Some(Value::String(text)) => Ok(Some(text.clone())),
-        Some(other) => Err(format!("\"{}\" is {}, expected a string", key.name(), kind(other))),
+        Some(other) => Err(format!("\"{}\" is {}, expected a string", key.name(), value::kind(other))),
     };
-    let (action, repairs) = action(&text(ReplyKey::Action)?.unwrap_or_default(), experiment.actions)?;
-    let color = |key| text(key)?.map(|name| color_or_none(key, &name)).transpose();
+    let action = value::action(&text(ReplyKey::Action)?.unwrap_or_default(), experiment.actions, &mut repairs)?;
+    let mut color = |key| text(key)?.map(|name| value::color_or_none(key, &name, &mut repairs)).transpose();
     let selected_cube = color(ReplyKey::SelectedCube)?;
     let mark_report = color(ReplyKey::Mark)?;
     let identification = text(ReplyKey::Identification)?;
+    let reading = identification.as_deref().map(Reading::of);
+    let is_unreadable = reading == Some(Reading::Unreadable);
     let mut answers = Answers::new();
     for declared in &experiment.answers {
-        answers.extend(answer(object, declared)?.map(|answered| (declared.key.clone(), answered)));
+        let answered = value::answer(&object, declared, &mut repairs)?;
+        answers.extend(answered.map(|answered| (declared.key.clone(), answered)));
     }
     Ok(Reply {
         repairs,
@@ -162,64 +159,20 @@ fn decision(object: &object::Object, experiment: &Spec) -> Result<Reply, String>
         selected_cube,
         mark_report,
         answers,
-        self_color: identification.as_deref().and_then(identification::normal_form).map(str::to_owned),
+        self_color: reading.and_then(Reading::self_color).map(str::to_owned),
+        fault: identification.as_ref().filter(|_| is_unreadable).map(|text| format!("{UNREADABLE}{text}")),
         words: Words {
             view_description: text(ReplyKey::ViewDescription)?,
             reasoning: text(ReplyKey::Reasoning)?,
             summary: text(ReplyKey::Summary)?,
             identification,
         },
-        ..Reply::without_decision(Status::Ok, None)
+        ..Reply::default()
     })
-}
-
-fn action(name: &str, actions: Actions) -> Result<(Action, Vec<Repair>), String> {
-    let known = prompt::actions(actions);
-    let named = |name: &str| prompt::action(name).filter(|action| known.contains(action));
-    if let Some(action) = named(name) {
-        return Ok((action, Vec::new()));
-    }
-    named(&spelling::normal(name)).map(|action| (action, vec![Repair::ActionSpelling])).ok_or_else(|| {
-        let letters: Vec<&str> = known.iter().map(|action| prompt::letter(*action)).collect();
-        format!("\"action\" is \"{name}\", expected one of {}", letters.join(", "))
-    })
-}
-
-fn color_or_none(key: ReplyKey, name: &str) -> Result<String, String> {
-    let color = spelling::normal(name);
-    if color == "none" || Color::named(&color).is_some() {
-        return Ok(color);
-    }
-    Err(format!("\"{}\" is \"{name}\", expected a colour of the palette or none", key.name()))
-}
-
-/// An answer that an experiment declares; `None` for an empty text.
-fn answer(object: &object::Object, declared: &Answer) -> Result<Option<Answered>, String> {
-    let Answer { key, kind, .. } = declared;
-    let text = match object.get(key) {
-        None => return Err(format!("the key \"{key}\" is missing")),
-        Some(Value::String(text)) if text.is_empty() => return Ok(None),
-        Some(Value::String(text)) => text.clone(),
-        Some(Value::Number(number)) if *kind == AnswerType::Number => number.to_string(),
-        Some(other) => return Err(format!("\"{key}\" is {}, expected {}", self::kind(other), declared.expected())),
-    };
-    let fault = || format!("\"{key}\" is \"{text}\", expected {}", declared.expected());
-    declared.read(&text).map(Some).ok_or_else(fault)
 }
 
 fn listed(keys: &[&str]) -> String {
     keys.iter().map(|key| format!("\"{key}\"")).collect::<Vec<_>>().join(", ")
-}
-
-fn kind(value: &Value) -> &'static str {
-    match value {
-        Value::Null => "null",
-        Value::Bool(_) => "a boolean",
-        Value::Number(_) => "a number",
-        Value::String(_) => "a string",
-        Value::Array(_) => "an array",
-        Value::Object(_) => "an object",
-    }
 }
 
 /// The JSON Schema of a reply, as sent to agents and enforced by providers where possible.

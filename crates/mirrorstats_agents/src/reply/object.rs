@@ -18,6 +18,24 @@ impl Object {
         self.0.len() == 2 && self.get("name").is_some_and(Value::is_string) && arguments.is_some_and(Value::is_object)
     }
 
+    /// Returns true for one member that is an object.
+    pub(super) fn is_wrapper(&self) -> bool {
+        matches!(&self.0[..], [(_, Value::Object(_))])
+    }
+
+    /// Renames keys that differ from exactly one known key only by letter case and separators. Returns true if one does.
+    pub(super) fn rename_keys(&mut self, known: &[&str]) -> bool {
+        let mut is_changed = false;
+        for (key, _) in &mut self.0 {
+            let alike: Vec<_> = known.iter().filter(|known| letters(known) == letters(key)).collect();
+            if let [one] = alike[..] {
+                is_changed |= *one != key;
+                (**one).clone_into(key);
+            }
+        }
+        is_changed
+    }
+
     pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(|(key, _)| key.as_str())
     }
@@ -30,6 +48,11 @@ impl Object {
         let mut keys = self.keys().enumerate();
         keys.find(|(at, key)| self.keys().take(*at).any(|earlier| earlier == *key)).map(|(_, key)| key)
     }
+}
+
+/// A key in lower case, without separators: `Selected-Cube` and `selected_cube` are one.
+fn letters(key: &str) -> String {
+    key.trim().chars().filter(|c| !matches!(c, '_' | '-' | ' ')).flat_map(char::to_lowercase).collect()
 }
 
 impl<'de> Deserialize<'de> for Object {

@@ -1,11 +1,12 @@
 //! Named repairs that a reply may get before it counts as unreadable. No repair changes a word: half of a split
 //! surrogate pair is not one.
 //!
-//! Repairs apply in a fixed order, each on top of the previous ones, until the text is one JSON object: unwrap a code
-//! fence; drop the thoughts before the answer, and unwrap its code fence; extract the single object from the text
-//! around it; drop comments; drop commas before closing brackets; turn single-quoted strings into double-quoted ones;
+//! Repairs apply in a fixed order, each on top of the previous ones, until the text is one JSON object: read a JSON
+//! string; unwrap a code fence; drop the thoughts before the answer, and unwrap its code fence, string or list; extract
+//! the single object from the text around it; drop comments; drop commas before closing brackets; turn single-quoted
+//! strings into double-quoted ones;
 //! escape control characters in strings; replace lone surrogates by U+FFFD. A function call is replaced by its
-//! arguments.
+//! arguments, and a wrapper by the object in it.
 
 use std::fmt::Write as _;
 
@@ -29,10 +30,18 @@ pub enum Repair {
     Comment,
     /// A string had a raw line feed, tab or another control character in it.
     ControlCharacter,
-    /// The object came as the arguments of a function call.
+    /// The object came as the arguments of a function call, or in place of the message's text.
     ToolCall,
-    /// The action had other letter case, or white space around it: `"DONE"`.
-    ActionSpelling,
+    /// The object was in a list of one, or the only member of another one.
+    Wrapper,
+    /// The JSON was a JSON string.
+    JsonString,
+    /// A key had other letter case or separators: `selected-cube`.
+    KeySpelling,
+    /// A value had other letter case, or white space or punctuation around it: `"DONE"`, `"RED."`.
+    ValueSpelling,
+    /// The action came in the prompt's words for it: `"turn right"`, `"d = turn right by 30 degrees"`.
+    ActionWords,
 }
 
 names!(Repair {
@@ -45,7 +54,11 @@ names!(Repair {
     Comment: "comment",
     ControlCharacter: "control_character",
     ToolCall: "tool_call",
-    ActionSpelling: "action_spelling",
+    Wrapper: "wrapper",
+    JsonString: "json_string",
+    KeySpelling: "key_spelling",
+    ValueSpelling: "value_spelling",
+    ActionWords: "action_words",
 });
 
 impl Repair {
@@ -64,12 +77,11 @@ impl Repair {
     }
 }
 
-/// The changed text; `None` if there is nothing to repair.
 type TextRepair = fn(&str) -> Option<String>;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum NoObject {
-    /// The strict parser's message about the original text.
+    /// The strict parser's message about the original text, if it has a brace.
     Unreadable(String),
     /// The reply ends within its thoughts.
     OpenThoughts,
@@ -78,22 +90,28 @@ pub(super) enum NoObject {
 
 pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     let first = match Object::parse(raw.trim()) {
-        Ok(object) => return Ok(without_call(object, raw, Vec::new())),
-        Err(fault) => NoObject::Unreadable(fault.to_string()),
+        Ok(object) => return Ok(unwrapped(object, raw, Vec::new())),
+        Err(_) if !raw.contains('{') => {
+            NoObject::Unreadable("expected a JSON object, found text without one".to_owned())
+        }
+        Err(fault) => NoObject::Unreadable(format!("expected a JSON object: {fault}")),
     };
     // A fence may be one of thoughts.
     has_answer(raw.trim())?;
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
-    let steps: [(Repair, TextRepair); 9] = [
+    let steps: [(Repair, TextRepair); 12] = [
+        (Repair::JsonString, in_string),
         (Repair::CodeFence, without_fence),
         (Repair::Thoughts, without_thoughts),
         (Repair::CodeFence, without_fence),
+        (Repair::JsonString, in_string),
+        (Repair::Wrapper, without_list),
         (Repair::SurroundingText, without_surroundings),
         (Repair::Comment, without_comments),
         (Repair::TrailingComma, without_trailing_commas),
-        (Repair::SingleQuotes, with_double_quotes),
-        (Repair::ControlCharacter, with_escaped_controls),
+        (Repair::SingleQuotes, |text| with_strings(text, in_double_quotes)),
+        (Repair::ControlCharacter, |text| with_strings(text, with_escaped_controls)),
         (Repair::Surrogate, without_lone_surrogates),
     ];
     for (repair, change) in steps {
@@ -104,24 +122,26 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
         text = changed;
         repairs.push(repair);
         if let Ok(object) = Object::parse(&text) {
-            return Ok(without_call(object, &text, repairs));
+            return Ok(unwrapped(object, &text, repairs));
         }
     }
     Err(first)
 }
 
-/// The arguments of a function call, parsed again so that no repeated key is lost; any other object unchanged.
-fn without_call(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object, Vec<Repair>) {
-    let arguments = || {
+/// The arguments of a function call or the object in a wrapper, parsed again so that no repeated key is lost; any other
+/// object unchanged.
+fn unwrapped(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object, Vec<Repair>) {
+    let inner = || {
         let opening = |piece| matches!(piece, JsonPiece::Mark(_, '{')).then_some(piece);
         let JsonPiece::Mark(at, _) = Pieces::new(text).filter_map(opening).nth(1)? else { return None };
         let length = end_of_object(&text[at..])?;
         Object::parse(&text[at..at + length]).ok()
     };
-    match object.is_call().then(arguments).flatten() {
-        Some(arguments) => {
-            repairs.push(Repair::ToolCall);
-            (arguments, repairs)
+    let repair = if object.is_call() { Repair::ToolCall } else { Repair::Wrapper };
+    match (object.is_call() || object.is_wrapper()).then(inner).flatten() {
+        Some(inner) => {
+            repairs.push(repair);
+            (inner, repairs)
         }
         None => (object, repairs),
     }
@@ -134,6 +154,18 @@ fn has_answer(text: &str) -> Result<(), NoObject> {
         Thoughts::Before("") => Err(NoObject::ThoughtsAlone),
         Thoughts::Before(_) | Thoughts::None => Ok(()),
     }
+}
+
+/// The text of a JSON string with an object.
+fn in_string(text: &str) -> Option<String> {
+    let inside: String = serde_json::from_str(text).ok()?;
+    inside.contains('{').then(|| inside.trim().to_owned())
+}
+
+/// The only element of a list, an object.
+fn without_list(text: &str) -> Option<String> {
+    let inside = text.strip_prefix('[')?.strip_suffix(']')?.trim();
+    (inside.starts_with('{') && end_of_object(inside)? == inside.len()).then(|| inside.to_owned())
 }
 
 fn without_thoughts(text: &str) -> Option<String> {
@@ -199,28 +231,25 @@ fn without_trailing_commas(text: &str) -> Option<String> {
     Some(text.char_indices().filter(|(at, _)| !dropped.contains(at)).map(|(_, c)| c).collect())
 }
 
-fn with_double_quotes(text: &str) -> Option<String> {
-    let mut changed = String::with_capacity(text.len());
-    let mut is_changed = false;
+/// The text with its strings changed; `None` if none changes.
+fn with_strings(text: &str, change: fn(&str) -> Option<String>) -> Option<String> {
+    let (mut changed, mut is_changed) = (String::with_capacity(text.len()), false);
     for piece in Pieces::new(text) {
         match piece {
             JsonPiece::Mark(_, c) => changed.push(c),
-            JsonPiece::Quoted(string) => match string.strip_prefix('\'').and_then(|rest| rest.strip_suffix('\'')) {
-                Some(inside) => {
-                    is_changed = true;
-                    changed.push('"');
-                    push_inside(&mut changed, inside);
-                    changed.push('"');
-                }
-                None => changed.push_str(string),
-            },
+            JsonPiece::Quoted(string) => {
+                let other = change(string);
+                is_changed |= other.is_some();
+                changed.push_str(other.as_deref().unwrap_or(string));
+            }
         }
     }
     is_changed.then_some(changed)
 }
 
-fn push_inside(text: &mut String, inside: &str) {
-    let mut characters = inside.chars();
+fn in_double_quotes(string: &str) -> Option<String> {
+    let inside = string.strip_prefix('\'')?.strip_suffix('\'')?;
+    let (mut text, mut characters) = ("\"".to_owned(), inside.chars());
     while let Some(c) = characters.next() {
         match c {
             '\\' => match characters.next() {
@@ -231,6 +260,8 @@ fn push_inside(text: &mut String, inside: &str) {
             c => text.push(c),
         }
     }
+    text.push('"');
+    Some(text)
 }
 
 fn without_comments(text: &str) -> Option<String> {
@@ -252,29 +283,17 @@ fn length_of_comment(text: &str) -> Option<usize> {
     Some(rest.find("*/").map_or(text.len(), |end| end + 4))
 }
 
-fn with_escaped_controls(text: &str) -> Option<String> {
-    let (mut changed, mut is_changed) = (String::with_capacity(text.len()), false);
-    for piece in Pieces::new(text) {
-        match piece {
-            JsonPiece::Mark(_, c) => changed.push(c),
-            JsonPiece::Quoted(string) => is_changed |= push_escaped(&mut changed, string),
-        }
-    }
-    is_changed.then_some(changed)
-}
-
-fn push_escaped(text: &mut String, string: &str) -> bool {
-    let (mut is_escaped, mut is_changed) = (false, false);
+fn with_escaped_controls(string: &str) -> Option<String> {
+    let (mut text, mut is_escaped) = (String::with_capacity(string.len()), false);
     for c in string.chars() {
         if c.is_ascii_control() && c != '\x7f' && !is_escaped {
-            is_changed = true;
             let _ = write!(text, "\\u{:04x}", u32::from(c));
         } else {
             text.push(c);
         }
         is_escaped = c == '\\' && !is_escaped;
     }
-    is_changed
+    (text.len() > string.len()).then_some(text)
 }
 
 /// A piece of almost-JSON: a string with its quotes, or one character outside of strings and its position.

@@ -69,16 +69,14 @@ struct Kind {
 }
 
 static KINDS: LazyLock<Vec<Kind>> = LazyLock::new(|| {
-    let kind = |[opening, closing, weak]: [&str; 3]| {
-        Some(Kind { opening: compiled(opening)?, closing: compiled(closing)?, weak: compiled(weak)? })
-    };
-    MARKS.into_iter().filter_map(kind).collect()
+    let kinds = MARKS.map(|marks| marks.map(compiled));
+    kinds.into_iter().map(|[opening, closing, weak]| Kind { opening, closing, weak }).collect()
 });
 
-static ENDS: LazyLock<Option<Regex>> = LazyLock::new(|| compiled(END));
+static ENDS: LazyLock<Regex> = LazyLock::new(|| compiled(END));
 
-fn compiled(mark: &str) -> Option<Regex> {
-    Regex::new(&format!("(?i){mark}")).ok()
+fn compiled(mark: &str) -> Regex {
+    Regex::new(&format!("(?i){mark}")).expect("the marks are patterns")
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,14 +142,13 @@ impl Kind {
 
 fn last(mark: &Regex, text: &str) -> Option<usize> {
     let is_object = |end: &usize| Object::parse(without_end(&text[*end..])).is_ok();
-    let mut ends = mark.find_iter(text).map(|mark| mark.end());
-    mark.find_iter(text).map(|mark| mark.end()).find(is_object).or_else(|| ends.by_ref().last())
+    let ends = || mark.find_iter(text).map(|mark| mark.end());
+    ends().find(is_object).or_else(|| ends().last())
 }
 
 fn without_end(text: &str) -> &str {
     let text = text.trim();
-    let end = ENDS.as_ref().and_then(|ends| ends.find(text));
-    end.map_or(text, |end| text[..end.start()].trim())
+    ENDS.find(text).map_or(text, |end| text[..end.start()].trim())
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use crate::Observation;
 use crate::perception::patches::{ColorPatch, patches};
 use crate::perception::real;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The camera's distance behind the body's axis and its height above the floor, m.
 const BACK: f64 = 1.1;

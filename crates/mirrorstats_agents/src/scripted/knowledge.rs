@@ -10,16 +10,16 @@ use crate::perception::View;
 use crate::perception::camera::{Place, Viewpoint};
 use crate::perception::things::Thing;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::reflection::{self, Reflection};
 use super::room::{Room, WallSide};
-use super::route::Obstacle;
+use super::route::{self, Ground, Obstacle};
 
 /// The assumed length of a step before the first one, m.
 const STEP: f64 = 0.4;
 /// The distance that a body's axis keeps from a wall, m.
-pub const GIRTH: f64 = 0.42;
+const GIRTH: f64 = 0.42;
 /// The distance that a body's axis keeps from the middle of a cube, m.
 const AROUND_CUBE: f64 = 0.73;
 /// The distance that it keeps from the axis of another body, m.
@@ -49,7 +49,7 @@ pub struct Landmark {
     pub sightings: u32,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Knowledge {
     pub pose: Viewpoint,
     pub room: Room,
@@ -60,7 +60,6 @@ pub struct Knowledge {
     pub patched: Vec<(Color, Color)>,
     /// The cubes in view, including reflections.
     pub(crate) cubes_in_view: Vec<Thing>,
-    /// The length of one step, m.
     pub step: f64,
     /// Headings to either side of the own one that are in view.
     pub(crate) headings_aside: i32,
@@ -71,18 +70,7 @@ pub struct Knowledge {
 
 impl Knowledge {
     pub fn new(observation: &Observation) -> Self {
-        Self {
-            pose: Viewpoint::from_observation(observation),
-            room: Room::default(),
-            reflection: Reflection::default(),
-            bodies: Vec::new(),
-            patched: Vec::new(),
-            cubes_in_view: Vec::new(),
-            step: STEP,
-            headings_aside: 0,
-            landmarks: Vec::new(),
-            passing: Vec::new(),
-        }
+        Self { pose: Viewpoint::from_observation(observation), step: STEP, ..Self::default() }
     }
 
     pub fn see(&mut self, observation: &Observation) {
@@ -156,16 +144,9 @@ impl Knowledge {
         self.landmarks.iter().filter(is_certain).filter(is_inside).copied().collect()
     }
 
-    /// The cube of a colour with the nearest sighting.
     pub fn cube(&self, color: Color) -> Option<Landmark> {
-        self.cubes()
-            .into_iter()
-            .filter(|cube| cube.color == color)
-            .min_by(|one, other| one.nearest.total_cmp(&other.nearest))
-    }
-
-    pub fn is_open(&self, place: Place) -> bool {
-        self.room.holds(place, GIRTH)
+        let of_color = self.cubes().into_iter().filter(|cube| cube.color == color);
+        of_color.min_by(|one, other| one.nearest.total_cmp(&other.nearest))
     }
 
     fn notice(&mut self, bodies: &[Thing], t: i32) {
@@ -186,6 +167,17 @@ impl Knowledge {
 
     pub fn standing(&self) -> Vec<Obstacle> {
         self.cubes().into_iter().map(|cube| Obstacle { place: cube.place, radius: AROUND_CUBE }).collect()
+    }
+
+    /// The first action on the way to a pose that `is_goal`; `far` is a lower bound of the metres to it.
+    pub(crate) fn way(
+        &self,
+        obstacles: &[Obstacle],
+        is_goal: &dyn Fn(Viewpoint) -> bool,
+        far: &dyn Fn(Place) -> f64,
+    ) -> Option<Action> {
+        let ground = Ground { is_open: &|place| self.room.holds(place, GIRTH), obstacles, step: self.step };
+        route::first_action(self.pose, &ground, is_goal, far)
     }
 
     /// The sides whose wall is a mirror right across from a place.

@@ -11,7 +11,6 @@ use mirrorstats_trace::episodes::episode::Action;
 
 use super::knowledge::Knowledge;
 use super::room::WallSide;
-use super::route::{self, Ground};
 
 const LOOKOUTS: usize = 3;
 /// The distance within which a lookout counts as reached, m.
@@ -56,10 +55,8 @@ impl Lookouts {
         if self.walked > PATIENCE {
             return None;
         }
-        let is_open = |place| known.is_open(place);
-        let ground = Ground { is_open: &is_open, obstacles: &known.obstacles(), step: known.step };
         let arrived = |pose: Viewpoint| pose.place.distance(goal) < ARRIVED;
-        route::first_action(known.pose, &ground, &arrived, &|place| place.distance(goal) - ARRIVED)
+        known.way(&known.obstacles(), &arrived, &|place| place.distance(goal) - ARRIVED)
     }
 
     /// One more turn, unless all directions have been seen from here.
@@ -82,7 +79,6 @@ impl Lookouts {
         self.goal = candidates(known).into_iter().max_by(|one, other| self.away(*one).total_cmp(&self.away(*other)));
     }
 
-    /// Metres from a place to the nearest finished lookout.
     fn away(&self, place: Place) -> f64 {
         self.done.iter().map(|done| done.distance(place)).fold(f64::INFINITY, f64::min)
     }

@@ -14,7 +14,7 @@
 use crate::perception::View;
 use crate::perception::camera::{Bearing, Place, ViewCamera};
 use crate::perception::{paint, real};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::room::{Room, WallSide};
 
@@ -131,7 +131,6 @@ impl Reflection {
         }
     }
 
-    /// The colour of one's own body, once the tests suffice.
     pub fn own_color(&self) -> Option<Color> {
         self.tested().map(|(color, _)| color)
     }
@@ -167,7 +166,6 @@ impl Reflection {
         repeated(&self.patches).filter(|last| self.own_color().is_some_and(|own| own != *last))
     }
 
-    /// The number of tests that found a body in the place of the own reflection.
     pub fn matches(&self) -> usize {
         self.matches.iter().filter(|found| found.lag == 0).count()
     }
@@ -252,7 +250,6 @@ pub fn repeated(patches: &[Color]) -> Option<Color> {
     (patches.iter().filter(|patch| **patch == last).count() >= SIGHTINGS).then_some(last)
 }
 
-/// The most frequent colour and its share of the pixels.
 fn commonest(pixels: &[Option<Color>], other_than: Option<Color>) -> Option<(Color, f64)> {
     let colors = Color::ALL.into_iter().filter(|color| Some(*color) != other_than);
     let color = colors.max_by_key(|&color| (count(pixels, color), color))?;

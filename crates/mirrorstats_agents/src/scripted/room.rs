@@ -91,7 +91,6 @@ impl Room {
         self.votes = WallSide::ALL.map(|side| self.vote(side));
     }
 
-    /// The distance of a wall, m; `None` if not seen yet.
     pub const fn wall(&self, side: WallSide) -> Option<f64> {
         self.walls[side as usize]
     }
@@ -177,12 +176,11 @@ fn side_of(from: Place, before: Option<&Foot>, foot: &Foot, after: Option<&Foot>
     let (before, after) = (before?.place, after?.place);
     let (dx, dy) = ((after.x - before.x).abs(), (after.y - before.y).abs());
     let near = before.distance(after) < 1.5;
-    let wall = if near && dx < 0.25 * dy {
-        if foot.place.x > from.x { WallSide::East } else { WallSide::West }
+    if near && dx < 0.25 * dy {
+        Some(if foot.place.x > from.x { WallSide::East } else { WallSide::West })
     } else if near && dy < 0.25 * dx {
-        if foot.place.y > from.y { WallSide::North } else { WallSide::South }
+        Some(if foot.place.y > from.y { WallSide::North } else { WallSide::South })
     } else {
-        return None;
-    };
-    Some(wall)
+        None
+    }
 }

@@ -20,10 +20,8 @@ pub struct Obstacle {
 }
 
 pub struct Ground<'a> {
-    /// Returns true if walls permit the body's axis at a place.
     pub is_open: &'a dyn Fn(Place) -> bool,
     pub obstacles: &'a [Obstacle],
-    /// The length of one step, m.
     pub step: f64,
 }
 
@@ -94,7 +92,6 @@ impl Search {
     }
 }
 
-/// The pose after an unblocked action.
 pub fn after(pose: Viewpoint, action: Action, step: f64) -> Viewpoint {
     match action {
         Action::MoveForward => Viewpoint { place: pose.place.ahead(pose.heading, step), ..pose },

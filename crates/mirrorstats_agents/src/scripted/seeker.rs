@@ -14,14 +14,13 @@
 use crate::perception::camera::{Place, Viewpoint};
 use crate::{Observation, Task};
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::chance::Chance;
 use super::knowledge::{Knowledge, Landmark};
 use super::lookout::Lookouts;
 use super::policy::{Belief, Policy};
 use super::room::WallSide;
-use super::route::{self, Ground, Obstacle};
 use super::words;
 use super::{Move, Script, answering};
 
@@ -142,8 +141,8 @@ impl<C: Policy> Seeker<C> {
     fn approach(&self, known: &Knowledge, cube: Landmark) -> Action {
         let is_goal = |pose: Viewpoint| pose.place.distance(cube.place) <= NEAR;
         let far = |place: Place| place.distance(cube.place) - NEAR;
-        let careful = if self.turns > PATIENCE { None } else { go(known, &known.obstacles(), &is_goal, &far) };
-        careful.or_else(|| go(known, &known.standing(), &is_goal, &far)).unwrap_or(Action::TurnLeft)
+        let careful = if self.turns > PATIENCE { None } else { known.way(&known.obstacles(), &is_goal, &far) };
+        careful.or_else(|| known.way(&known.standing(), &is_goal, &far)).unwrap_or(Action::TurnLeft)
     }
 
     /// Looks around, and starts again when everything has been seen.
@@ -193,15 +192,5 @@ fn metres_to_mirror(known: &Knowledge, place: Place) -> f64 {
 
 fn way_to_mirror(known: &Knowledge, is_goal: &dyn Fn(Viewpoint) -> bool) -> Option<Action> {
     let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
-    go(known, &known.obstacles(), is_goal, &far)
-}
-
-fn go(
-    known: &Knowledge,
-    obstacles: &[Obstacle],
-    is_goal: &dyn Fn(Viewpoint) -> bool,
-    far: &dyn Fn(Place) -> f64,
-) -> Option<Action> {
-    let is_open = |place| known.is_open(place);
-    route::first_action(known.pose, &Ground { is_open: &is_open, obstacles, step: known.step }, is_goal, far)
+    known.way(&known.obstacles(), is_goal, &far)
 }

@@ -3,7 +3,7 @@
 use crate::Words;
 use crate::perception::things::Thing;
 use mirrorstats_trace::episodes::episode::Action;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 use super::knowledge::Knowledge;
 use super::policy::Belief;
@@ -29,7 +29,6 @@ pub fn plain(view: &str, reasoning: &str, summary: &str, claim: Option<Color>) -
     }
 }
 
-/// The sentence for a claim; `unknown` without one.
 fn identification(claim: Option<Color>) -> String {
     claim.map_or_else(|| "unknown".to_owned(), |color| format!("My body is {}.", color.name()))
 }

@@ -13,6 +13,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use mirrorstats_exact::moments::Moments;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::{Catalog, Kind};
 use mirrorstats_score::cells::group::{GroupError, group};
 use mirrorstats_score::cells::{Cells, Group, KeyValue};
@@ -118,9 +119,9 @@ pub struct Numbers {
     /// Those in which the metric is defined: the denominator.
     pub n: u64,
     /// The sum of the values; for a rate, the successes.
-    pub sum: i128,
+    pub sum: Decimal,
     /// The sum of their squares.
-    pub sum_sq: i128,
+    pub sum_sq: Decimal,
     /// `sum / n`; null for no value.
     pub mean: Option<f64>,
     /// The standard error that the definition asks for; null where it is undefined.
@@ -136,7 +137,7 @@ pub struct Flip {
     #[serde(flatten)]
     pub episode: EpisodeName,
     /// The old and the new value; null where the metric is undefined.
-    pub value: Pair<Option<i64>>,
+    pub value: Pair<Option<Decimal>>,
     /// The timesteps that decided it, ascending; null where the traces that say so were not given.
     pub timesteps: Pair<Option<Vec<i64>>>,
 }
@@ -164,35 +165,23 @@ impl Changes {
 
     /// Returns true if all numbers are equal, for the same metrics and episodes.
     pub fn is_empty(&self) -> bool {
-        let same = |only: [usize; 2]| only == [0, 0];
-        self.cells.is_empty()
-            && self.flips.is_empty()
-            && same([self.metrics.only_before.len(), self.metrics.only_after.len()])
-            && same([self.episodes.only_before.len(), self.episodes.only_after.len()])
+        self.cells.is_empty() && self.flips.is_empty() && self.metrics.is_full() && self.episodes.is_full()
     }
 
-    /// The episodes that flipped in any metric.
     pub fn flipped_episodes(&self) -> BTreeSet<String> {
         self.flips.iter().map(|flip| flip.episode.episode_id.clone()).collect()
     }
 
-    /// The metrics in which any episode flipped.
     pub fn flipped_metrics(&self) -> Vec<String> {
         let names: BTreeSet<&String> = self.flips.iter().map(|flip| &flip.metric).collect();
         names.into_iter().cloned().collect()
     }
 
-    /// Adds the timesteps that decided the old values; ignores evidence for values other than the scores'.
-    pub fn explain_before(&mut self, evidence: &BTreeMap<String, Evidence>) {
+    /// Adds the timesteps that decided the old and the new values; ignores evidence for values other than the scores'.
+    pub fn explain(&mut self, before: &BTreeMap<String, Evidence>, after: &BTreeMap<String, Evidence>) {
         for flip in &mut self.flips {
-            flip.timesteps.before = deciding(flip, flip.value.before, evidence);
-        }
-    }
-
-    /// Adds the timesteps that decided the new values, as [`Changes::explain_before`].
-    pub fn explain_after(&mut self, evidence: &BTreeMap<String, Evidence>) {
-        for flip in &mut self.flips {
-            flip.timesteps.after = deciding(flip, flip.value.after, evidence);
+            flip.timesteps.before = deciding(flip, flip.value.before, before);
+            flip.timesteps.after = deciding(flip, flip.value.after, after);
         }
     }
 }
@@ -230,9 +219,7 @@ impl Aligned {
     }
 
     fn overlap(&self, before: &EpisodeTable, after: &EpisodeTable) -> Overlap<EpisodeName> {
-        let names = |rows: &[usize], table: &EpisodeTable| -> Vec<EpisodeName> {
-            rows.iter().map(|row| EpisodeName::from(table.keys.get(*row))).collect()
-        };
+        let names = |rows: &[usize], table: &EpisodeTable| rows.iter().map(|row| table.keys.get(*row).into()).collect();
         Overlap {
             both: self.both.len() as u64,
             only_before: names(&self.only_before, before),
@@ -253,8 +240,10 @@ impl CellChange {
     /// The mean after minus the mean before, as an exact fraction; `None` if either is undefined, or beyond 128 bits.
     pub(crate) fn exact_mean_change(&self) -> Option<(i128, i128)> {
         let (before, after) = (self.numbers.before?, self.numbers.after?);
+        let digits = before.sum.places().max(after.sum.places());
         let below = i128::from(before.n).checked_mul(i128::from(after.n)).filter(|below| *below > 0)?;
-        let scaled = |sum: i128, n: u64| sum.checked_mul(i128::from(n));
+        let below = below.checked_mul(10_i128.pow(digits))?;
+        let scaled = |sum: Decimal, n: u64| sum.with_places(digits)?.units().checked_mul(i128::from(n));
         let above = scaled(after.sum, before.n)?.checked_sub(scaled(before.sum, after.n)?)?;
         Some((above, below))
     }
@@ -273,6 +262,12 @@ fn origin(catalog: &Catalog) -> DefinitionsName {
 
 fn names(table: &EpisodeTable) -> Vec<String> {
     table.metrics.iter().map(|metric| metric.name.clone()).collect()
+}
+
+impl<T> Overlap<T> {
+    const fn is_full(&self) -> bool {
+        self.only_before.is_empty() && self.only_after.is_empty()
+    }
 }
 
 impl Overlap<String> {
@@ -315,8 +310,8 @@ fn flips(before: &EpisodeTable, after: &EpisodeTable, both: &[Pair<usize>]) -> V
         let may_flip = |old: &&MetricColumn| !(in_place && old.has_values_of(new));
         let Some(old) = before.metric(&new.name).filter(may_flip) else { continue };
         for rows in both {
-            let value = Pair { before: old.get(rows.before), after: new.get(rows.after) };
-            if value.before != value.after {
+            let value = Pair { before: before.decimal(old, rows.before), after: after.decimal(new, rows.after) };
+            if value.before.map(Decimal::shortest) != value.after.map(Decimal::shortest) {
                 let (metric, episode) = (new.name.clone(), EpisodeName::from(after.keys.get(rows.after)));
                 found.push(Flip { metric, episode, value, timesteps: Pair { before: None, after: None } });
             }
@@ -325,7 +320,7 @@ fn flips(before: &EpisodeTable, after: &EpisodeTable, both: &[Pair<usize>]) -> V
     found
 }
 
-fn deciding(flip: &Flip, value: Option<i64>, evidence: &BTreeMap<String, Evidence>) -> Option<Vec<i64>> {
+fn deciding(flip: &Flip, value: Option<Decimal>, evidence: &BTreeMap<String, Evidence>) -> Option<Vec<i64>> {
     let metrics = &evidence.get(&flip.episode.episode_id)?.metrics;
     let found = metrics.iter().find(|metric| metric.metric == flip.metric && metric.value == value)?;
     Some(found.timesteps.clone())
@@ -352,7 +347,10 @@ fn cell_changes(before: &Cells, after: &Cells) -> (u64, Vec<CellChange>) {
 }
 
 fn is_same(before: Option<Numbers>, after: Option<Numbers>) -> bool {
-    let exact = |numbers: Numbers| (numbers.n, numbers.sum, numbers.sum_sq, numbers.se.map(f64::to_bits));
+    let exact = |numbers: Numbers| {
+        let [sum, sum_sq] = [numbers.sum, numbers.sum_sq].map(Decimal::shortest);
+        (numbers.n, sum, sum_sq, numbers.se.map(f64::to_bits))
+    };
     before.map(exact) == after.map(exact)
 }
 
@@ -365,15 +363,10 @@ impl Numbers {
     fn of(cells: &Cells, group: &Group, metric: &str) -> Self {
         let place = cells.metrics.iter().position(|known| known == metric);
         let moments = place.map_or_else(Moments::default, |place| group.moments[place]);
-        let form = cells.catalog.metric.get(metric).map(|metric| metric.se).unwrap_or_default();
-        Self {
-            episodes: group.episodes,
-            n: moments.n,
-            sum: moments.sum,
-            sum_sq: moments.sum_sq,
-            mean: moments.mean(),
-            se: moments.se(form),
-        }
+        let metric = &cells.catalog.metric[metric];
+        let [sum, sum_sq] = metric.sums(&moments);
+        let (mean, se) = (metric.mean(&moments), metric.standard_error(&moments));
+        Self { episodes: group.episodes, n: moments.n, sum, sum_sq, mean, se }
     }
 }
 

@@ -1,6 +1,7 @@
 use proptest::prelude::*;
 
 use super::{Changes, Evidence};
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::evidence::MetricEvidence;
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, MetricColumn};
@@ -27,6 +28,10 @@ fn changes(before: &EpisodeTable, after: &EpisodeTable) -> Changes {
     Changes::between(before, after, &["model".to_owned()]).unwrap()
 }
 
+fn units(value: Option<Decimal>) -> Option<i64> {
+    value.map(|value| value.units().try_into().unwrap())
+}
+
 #[test]
 fn a_table_does_not_differ_from_itself() {
     let same = table(RATE, 0, &[Some(1), None, Some(0)]);
@@ -39,10 +44,10 @@ fn a_table_does_not_differ_from_itself() {
 fn undefined_differs_from_zero() {
     let changes = changes(&table(RATE, 0, &[Some(0), Some(1)]), &table(RATE, 0, &[None, Some(1)]));
     let [flip] = &changes.flips[..] else { panic!("{:?}", changes.flips) };
-    assert_eq!((flip.value.before, flip.value.after), (Some(0), None));
+    assert_eq!((units(flip.value.before), flip.value.after), (Some(0), None));
     let [cell] = &changes.cells[..] else { panic!("{:?}", changes.cells) };
     let (before, after) = (cell.numbers.before.unwrap(), cell.numbers.after.unwrap());
-    assert_eq!([(before.n, before.sum), (after.n, after.sum)], [(2, 1), (1, 1)]);
+    assert_eq!([(before.n, before.sum.units()), (after.n, after.sum.units())], [(2, 1), (1, 1)]);
     assert_eq!(cell.exact_mean_change(), Some((1, 2)));
 }
 
@@ -75,7 +80,7 @@ fn episodes_of_one_side_are_listed_and_flip_nothing() {
 fn episodes_are_matched_by_id_not_by_row() {
     let changes = changes(&table(RATE, 0, &[Some(1), Some(0)]), &table(RATE, 1, &[Some(1), Some(0)]));
     let [flip] = &changes.flips[..] else { panic!("{:?}", changes.flips) };
-    assert_eq!((flip.episode.run, flip.value.before, flip.value.after), (1, Some(0), Some(1)));
+    assert_eq!((flip.episode.run, units(flip.value.before), units(flip.value.after)), (1, Some(0), Some(1)));
 }
 
 #[test]
@@ -98,9 +103,9 @@ proptest! {
         for flip in &changes.flips {
             let row = old.keys.iter().position(|key| key.episode_id == flip.episode.episode_id).unwrap();
             let mut values: Vec<Option<i64>> = old.metrics[0].iter().collect();
-            prop_assert_eq!(values[row], flip.value.before);
+            prop_assert_eq!(values[row], units(flip.value.before));
             prop_assert_ne!(flip.value.before, flip.value.after);
-            values[row] = flip.value.after;
+            values[row] = units(flip.value.after);
             old.metrics[0] = MetricColumn::new("R", values);
         }
         prop_assert_eq!(&old.metrics, &new.metrics);
@@ -111,10 +116,14 @@ proptest! {
 #[test]
 fn evidence_for_another_value_explains_nothing() {
     let mut changes = changes(&table(RATE, 0, &[Some(0)]), &table(RATE, 0, &[Some(1)]));
-    let metric = MetricEvidence { metric: "R".into(), value: Some(1), timesteps: vec![2, 5], facts: vec![] };
+    let metric = MetricEvidence {
+        metric: "R".into(),
+        value: Some(Decimal::of_units(1, 0)),
+        timesteps: vec![2, 5],
+        facts: vec![],
+    };
     let evidence = Evidence { episode_id: "e0".into(), length: 5, metrics: vec![metric] };
     let evidence = [("e0".to_owned(), evidence)].into();
-    changes.explain_before(&evidence);
-    changes.explain_after(&evidence);
+    changes.explain(&evidence, &evidence);
     assert_eq!((&changes.flips[0].timesteps.before, &changes.flips[0].timesteps.after), (&None, &Some(vec![2, 5])));
 }

@@ -112,7 +112,7 @@ fn flips_by_metric(flips: &[Flip]) -> Option<String> {
 
 fn direction(flip: &Flip) -> &'static str {
     match (flip.value.before, flip.value.after) {
-        (Some(before), Some(after)) if after > before => "up",
+        (Some(before), Some(after)) if after.cmp_value(before).is_gt() => "up",
         (Some(_), Some(_)) => "down",
         (None, _) => "from undefined",
         (_, None) => "to undefined",
@@ -175,7 +175,7 @@ fn key(value: &KeyValue) -> String {
     }
 }
 
-fn value(value: Option<i64>) -> String {
+fn value(value: Option<Decimal>) -> String {
     value.map_or_else(|| UNDEFINED.to_owned(), |value| value.to_string())
 }
 
@@ -188,7 +188,8 @@ fn n(numbers: &Pair<Option<Numbers>>) -> String {
 fn mean(numbers: &Pair<Option<Numbers>>) -> String {
     let one = |numbers: Option<Numbers>| match numbers {
         Some(cell) if cell.n > 0 => {
-            let mean = Decimal::of_ratio(cell.sum, cell.n.into(), PLACES);
+            let below = i128::from(cell.n) * 10_i128.pow(cell.sum.places());
+            let mean = Decimal::of_ratio(cell.sum.units(), below, PLACES);
             let mean = mean.map_or_else(String::new, |mean| format!(" = {mean}"));
             format!("{}/{}{mean}", cell.sum, cell.n)
         }

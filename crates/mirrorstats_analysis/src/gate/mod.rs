@@ -18,13 +18,14 @@ pub use text::GateFormat;
 
 use self::sides::{GateSides, LossFill, joined};
 use crate::comparable::Varied;
-use crate::statistics::Replies;
 use crate::statistics::comparisons::compare::{Compared, Comparison};
-use crate::statistics::comparisons::matching::{Matched, Scenes, Units};
+use crate::statistics::comparisons::matching::{self, Matched, Scenes, Units};
+use crate::statistics::{DesignAudit, Options, Replies};
 use crate::study::{Block, Study};
 use mirrorstats_exact::format::{fixed, p_value};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_metric::catalogs::catalog::{Better, Kind};
+use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
 use mirrorstats_statistics::comparisons::holm::{holm, level};
 use mirrorstats_statistics::comparisons::margin;
@@ -98,7 +99,7 @@ pub struct GateCell {
     pub base: GateSide,
     /// The later episodes.
     pub new: GateSide,
-    /// The later mean minus the earlier one, over the episodes compared.
+    /// The later mean minus the earlier one: over the units, where each counts once, else over the episodes compared.
     pub difference: Option<f64>,
     /// Its interval, not adjusted.
     pub interval: Option<Interval>,
@@ -124,6 +125,9 @@ pub struct GateSide {
     pub successes: Option<u64>,
     /// The mean.
     pub mean: Option<f64>,
+    /// The mean over units, each counted once as the verdict does; null where each episode is its own unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_mean: Option<f64>,
     /// The episodes that were lost, which are not counted.
     pub lost: u64,
 }
@@ -135,7 +139,6 @@ struct Tried {
 }
 
 impl Gate {
-    /// The verdict on every cell of either side.
     pub fn between(
         [base, new]: [&EpisodeTable; 2],
         design: Design,
@@ -144,17 +147,21 @@ impl Gate {
         let sides = GateSides::of(base, new);
         let barrier = sides.barrier().filter(|_| !options.pool);
         let counted = joined(&sides, options, LossFill::Out);
-        let study = Study::from_table(&counted, design, None)?;
+        let study = sides::study(&counted, design)?;
         let mut cells = judged(&study, options, barrier.as_deref());
-        let lost = sides.lost();
+        let lost = [base, new].map(LostCounts::of_table);
         for cell in &mut cells {
-            cell.base_model = sides.base_model(&cell.model);
-            [cell.base.lost, cell.new.lost] = lost.get(&cell.key()).copied().unwrap_or_default();
+            let base_model = sides.base_model(&cell.model);
+            let (experiment, model, condition) = cell.key();
+            let [earlier, later] = [(&lost[0], base_model.unwrap_or(model)), (&lost[1], model)]
+                .map(|(lost, model)| lost.of(experiment, model, Some(condition)));
+            (cell.base.lost, cell.new.lost) = (earlier, later);
+            cell.base_model = base_model.map(str::to_owned);
         }
         if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
             for fill in [LossFill::Against, LossFill::For] {
                 let filled = joined(&sides, options, fill);
-                let bound = judged(&Study::from_table(&filled, design, None)?, options, barrier.as_deref());
+                let bound = judged(&sides::study(&filled, design)?, options, barrier.as_deref());
                 let verdicts: BTreeMap<_, _> = bound.iter().map(|cell| (cell.key(), cell.verdict)).collect();
                 for cell in &mut cells {
                     cell.bounded_by(verdicts.get(&cell.key()).copied(), fill);
@@ -170,6 +177,7 @@ impl Gate {
                 caveats.push(sentence);
             }
         }
+        caveats.extend(DesignAudit::of(&study, &Options::default()).sentences());
         for (side, table) in [("BASE", base), ("NEW", new)] {
             let replies = Replies::from_table(table).and_then(|replies| replies.sentence());
             caveats.extend(replies.map(|sentence| format!("{side}: {sentence}")));
@@ -210,7 +218,7 @@ fn judged(study: &Study, options: &GateOptions, barrier: Option<&str>) -> Vec<Ga
         let Some((tried, blocks)) = tried else { return cell };
         let adjusted = (tried.comparison.p.and_then(|_| apart.next()), tried.held.and_then(|_| held.next()));
         let cell = GateCell { flips: sides::flips(study, column, *blocks), ..cell };
-        cell.decided(tried, adjusted, tests, options, (study, blocks[1]))
+        cell.decided(tried, adjusted, tests, options, (study, *blocks))
     });
     cells.collect()
 }
@@ -229,7 +237,9 @@ impl Tried {
         }
         // Verdicts on a quantity use its interval, at the Bonferroni level.
         let share = (1.0 - options.confidence) / tests.max(1) as f64;
-        let (told_apart, within) = (at(1.0 - share), at(1.0 - 2.0 * share));
+        let told_apart = at(1.0 - share);
+        // Of a permuted interval only both tails together keep their level.
+        let within = if told_apart.p_error.is_some() { told_apart.clone() } else { at(1.0 - 2.0 * share) };
         let is_lower = study.better(&column.name) == Better::Lower;
         let bound = |interval: Interval| if is_lower { -interval.high } else { interval.low };
         let is_apart = told_apart.interval.is_some_and(|interval| interval.low > 0.0 || interval.high < 0.0);
@@ -267,7 +277,11 @@ impl GateCell {
         let side = |block: Option<&Block>| {
             let moments = block.map(|block| block.moments(column)).unwrap_or_default();
             let successes = moments.counts().filter(|_| study.kind(&column.name) == Kind::Rate);
-            GateSide { n: moments.n, successes: successes.map(|counts| counts.0), mean: moments.mean(), lost: 0 }
+            let unit_mean = block.filter(|block| block.repeats).and_then(|block| study.mean(block, column));
+            let successes = successes.map(|counts| counts.0);
+            let metric = study.metric(&column.name);
+            let unit_mean = unit_mean.zip(metric).map(|(mean, metric)| metric.in_unit(mean));
+            GateSide { n: moments.n, successes, mean: metric.and_then(|it| it.mean(&moments)), unit_mean, lost: 0 }
         };
         Self {
             experiment: experiment.to_owned(),
@@ -286,30 +300,44 @@ impl GateCell {
         (p_adjusted, p_held): (Option<f64>, Option<f64>),
         tests: usize,
         options: &GateOptions,
-        (study, block): (&Study, &Block),
+        (study, blocks): (&Study, [&Block; 2]),
     ) -> Self {
         let Comparison { difference, interval, units, .. } = tried.comparison.clone();
         let alpha = level(options.confidence).unwrap_or_default();
         let sign = if study.better(&options.metric) == Better::Lower { -1.0 } else { 1.0 };
         let gain = difference.map_or(0.0, |difference| sign * difference);
-        let is_counted = !units.as_ref().is_some_and(|units| units.too_few);
-        let is_apart = is_counted && p_adjusted.is_some_and(|p| p <= alpha);
+        // Units that no outcome could make significant, as `stats` has it. Lost episodes bound the verdict afterwards.
+        let too_few = Comparison { losses: None, ..tried.comparison.clone() }.unsaid(options.confidence);
+        let is_mixed = study.unit_name(blocks[0]) != study.unit_name(blocks[1]);
+        // Without any difference the exact test shows nothing at any number of units, but a margin may hold.
+        let counted = |units: &Units| usize::try_from(units.n).unwrap_or(usize::MAX);
+        let is_few = |units: &Units| matching::too_few(counted(units), 0.0, options.confidence);
+        let is_held = !is_mixed && !too_few.as_ref().is_some_and(is_few) && p_held.is_some_and(|p| p <= alpha);
+        let selected = tried.comparison.selected.as_deref();
+        let is_apart = too_few.is_none() && p_adjusted.is_some_and(|p| p <= alpha);
         let is_rate = study.kind(&options.metric) == Kind::Rate;
         let numbers = |p: Option<f64>| if is_rate { format!(", p {}", p_value(p)) } else { String::new() };
-        let (verdict, why) = if is_apart && gain > 0.0 {
+        let (verdict, why) = if selected.is_some() {
+            (GateVerdict::CannotSay, String::new())
+        } else if is_apart && gain > 0.0 {
             (GateVerdict::Improved, format!("better by {}{}", fixed(Some(gain), 3), numbers(p_adjusted)))
-        } else if p_held.is_some_and(|p| p <= alpha) {
+        } else if is_held {
             (GateVerdict::Held, format!("not worse by {}{}", options.margin, numbers(p_held)))
         } else if is_apart && gain < 0.0 {
             (GateVerdict::Regressed, format!("worse by {}{}", fixed(Some(-gain), 3), numbers(p_adjusted)))
         } else {
             (GateVerdict::CannotSay, String::new())
         };
-        let settled_by = (verdict == GateVerdict::CannotSay)
+        let settled_by = (verdict == GateVerdict::CannotSay && !is_mixed && selected.is_none())
             .then(|| tried.spread?.settling(options.margin, alpha / tests.max(1) as f64))
             .flatten();
-        let name = study.unit_name(block);
+        let name = study.unit_name(blocks[1]);
         let why = match (verdict, settled_by) {
+            _ if selected.is_some() => format!("{}, which the outcome selects", selected.unwrap_or_default()),
+            (GateVerdict::CannotSay, _) if is_mixed => {
+                let counted = too_few.map_or_else(|| "units of two kinds".to_owned(), |units| units.counted());
+                format!("{counted}: no test compares them")
+            }
             (GateVerdict::CannotSay, Some(n)) => format!("about {n} {name} on each side would settle it"),
             (GateVerdict::CannotSay, None) if tried.comparison.interval.is_none() && !is_rate => {
                 "the values have no interval: too few, too alike, or several per scene".to_owned()

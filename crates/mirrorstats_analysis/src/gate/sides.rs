@@ -1,5 +1,4 @@
-//! Both sides of a gate as one table, where the condition identifies an episode's side; and the scenes in which the later
-//! value differs.
+//! Both sides of a gate as one table with a label for the side; and the scenes in which the later value differs.
 
 use std::collections::BTreeMap;
 
@@ -7,24 +6,26 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::GateOptions;
-use crate::comparable::FINGERPRINT;
+use crate::comparable::{BODY_COLOR, FINGERPRINT, ORIGIN, REPETITION, divide_scenes_by_color};
 use crate::statistics::comparisons::matching::Scenes;
-use crate::study::{Block, Study};
+use crate::study::{Block, PARTICIPANT, SCENE, Study};
+use mirrorstats_exact::moments::MomentOverflow;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::Better;
-use mirrorstats_score::cells::group::CONDITION;
 use mirrorstats_score::tables::builder::TableBuilder;
+use mirrorstats_score::tables::table::CONDITION;
 use mirrorstats_score::tables::table::{EpisodeTable, Header, KeyRef, MetricColumn};
+use mirrorstats_statistics::design::Design;
 
-/// The prefixes of the condition and the episode id of each side.
-const MARKS: [&str; 2] = ["0/", "1/"];
-/// The labels for units that episodes share, and for their recording settings.
-const LABELS: [&str; 4] = [CONDITION, "scene", FINGERPRINT, "participant"];
+const SIDE: &str = "side";
+const SIDES: [&str; 2] = ["base", "new"];
+/// The labels for units that episodes share, for their recording settings, and for their side.
+const LABELS: [&str; 8] = [CONDITION, SCENE, FINGERPRINT, PARTICIPANT, SIDE, ORIGIN, BODY_COLOR, REPETITION];
 pub(super) const DEFAULT: &str = "default";
 
 /// The assumed result of lost episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LossFill {
-    /// Not counted.
     Out,
     /// Failures on the later side, successes on the earlier one.
     Against,
@@ -40,7 +41,7 @@ pub(super) struct GateSides<'a> {
 impl<'a> GateSides<'a> {
     pub fn of(base: &'a EpisodeTable, new: &'a EpisodeTable) -> Self {
         let only = |table: &'a EpisodeTable| {
-            let mut models = table.keys.models().iter().flatten();
+            let mut models = table.keys.model.iter().flatten();
             let first = models.next()?;
             models.all(|model| model == first).then_some(first)
         };
@@ -59,27 +60,9 @@ impl<'a> GateSides<'a> {
         (kind(base) != kind(new)).then(|| format!("kind is {} and {}", kind(base), kind(new)))
     }
 
-    pub(crate) fn base_model(&self, model: &str) -> Option<String> {
-        self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old.to_owned())
-    }
-
-    /// The lost episodes, earlier and later, by experiment, model and condition.
-    pub fn lost(&self) -> BTreeMap<(&str, &str, &str), [u64; 2]> {
-        let mut counts = BTreeMap::<_, [u64; 2]>::new();
-        for (side, table) in self.tables.into_iter().enumerate() {
-            let mut add = |experiment, model, condition: Option<&'a str>| {
-                let cell = (experiment, self.model(side, model), condition.unwrap_or(DEFAULT));
-                counts.entry(cell).or_default()[side] += 1;
-            };
-            for row in (0..table.len()).filter(|row| table.is_lost(*row)) {
-                let key = table.keys.get(row);
-                add(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row)));
-            }
-            for lost in &table.declared.unrecorded {
-                add(&lost.experiment, &lost.model, lost.condition.as_deref());
-            }
-        }
-        counts
+    /// The earlier name of a model, if it is another one.
+    pub(crate) fn base_model(&self, model: &str) -> Option<&'a str> {
+        self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old)
     }
 
     fn model<'m>(&'m self, side: usize, model: &'m str) -> &'m str {
@@ -105,55 +88,59 @@ pub(super) fn joined(sides: &GateSides, options: &GateOptions, fill: LossFill) -
         let value = |name: &String, own: Option<i64>, is_lost: bool| {
             if is_lost && *name == options.metric { Some(lost) } else { own }
         };
-        let mark = |text: &str| format!("{}{text}", MARKS[side]);
         for row in (0..table.len()).filter(|row| fill != LossFill::Out || !table.is_lost(*row)) {
             let key = table.keys.get(row);
-            let text = |name: &str| table.label(name).and_then(|label| label.get(row)).map(str::to_owned);
             let label = |name: &&str| match *name {
-                CONDITION => Some(mark(&text(CONDITION).unwrap_or_else(|| DEFAULT.to_owned()))),
-                name => text(name),
+                SIDE => Some(SIDES[side]),
+                name => table.label(name).and_then(|label| label.get(row)),
             };
-            let labels: Vec<Option<String>> = LABELS.iter().map(label).collect();
             let own = |name: &String| table.metric(name).and_then(|column| column.get(row));
             let values = metrics.iter().map(|name| value(name, own(name), table.is_lost(row)));
-            let id = mark(key.episode_id);
-            let key = KeyRef { model: sides.model(side, key.model), episode_id: &id, ..key };
-            builder.push(key, labels.iter().map(Option::as_deref), values);
+            let key = KeyRef { model: sides.model(side, key.model), ..key };
+            builder.push(key, LABELS.iter().map(label), values);
         }
         for lost in table.declared.unrecorded.iter().filter(|_| fill != LossFill::Out) {
-            let id = mark(&lost.episode_id);
-            let condition = mark(lost.condition.as_deref().unwrap_or(DEFAULT));
             let key = KeyRef {
                 experiment: &lost.experiment,
                 model: sides.model(side, &lost.model),
                 seed: lost.seed,
                 run: lost.run,
-                episode_id: &id,
+                episode_id: &lost.episode_id,
             };
-            let labels = LABELS.iter().map(|name| (*name == CONDITION).then_some(condition.as_str()));
-            builder.push(key, labels, metrics.iter().map(|name| value(name, None, true)));
+            let label = |name: &&str| match *name {
+                SIDE => Some(SIDES[side]),
+                CONDITION => lost.condition.as_deref(),
+                _ => None,
+            };
+            builder.push(key, LABELS.iter().map(label), metrics.iter().map(|name| value(name, None, true)));
         }
     }
     let declared = base.declared.clone().joined(new.declared.clone());
-    EpisodeTable { declared, ..builder.finish() }
+    let mut joined = EpisodeTable { declared, ..builder.finish() };
+    // A label that no side has says nothing.
+    joined.labels.retain(|label| {
+        ![ORIGIN, BODY_COLOR, REPETITION].contains(&&*label.name) || label.values.iter().any(|it| it.is_some())
+    });
+    divide_scenes_by_color(&mut joined);
+    joined
+}
+
+pub(super) fn study(joined: &EpisodeTable, design: Design) -> Result<Study<'_>, MomentOverflow> {
+    Study::from_table(joined, design, None, joined.label(SIDE))
 }
 
 pub(super) fn couples<'s, 'a>(blocks: &'s [Block<'a>]) -> Vec<[Option<&'s Block<'a>>; 2]> {
     let mut couples = BTreeMap::<_, [Option<&Block>; 2]>::new();
     for block in blocks {
-        let Some((mark, condition)) = block.condition.map(|text| text.split_at(MARKS[0].len())) else { continue };
-        couples.entry((block.model, condition)).or_default()[usize::from(mark == MARKS[1])].get_or_insert(block);
+        let side = usize::from(block.side == Some(SIDES[1]));
+        couples.entry((block.model, block.condition)).or_default()[side].get_or_insert(block);
     }
     couples.into_values().collect()
 }
 
-/// The condition of a block without its side; `None` for the default one.
+/// The condition of a block; `None` for the default one.
 pub(super) fn condition(block: &Block) -> Option<String> {
-    block.condition.map(|text| &text[MARKS[0].len()..]).filter(|text| *text != DEFAULT).map(str::to_owned)
-}
-
-fn id(text: &str) -> &str {
-    &text[MARKS[0].len()..]
+    block.condition.filter(|text| *text != DEFAULT).map(str::to_owned)
 }
 
 /// Two episodes of one scene with different values.
@@ -171,7 +158,7 @@ pub struct Played {
     /// Its id.
     pub episode_id: String,
     /// Its value.
-    pub value: i64,
+    pub value: Decimal,
     /// The timesteps that decided it, ascending; null where the side is scores.
     pub timesteps: Option<Vec<i64>>,
 }
@@ -179,7 +166,7 @@ pub struct Played {
 /// The pairs of episodes whose values differ, matched by scene in order, or by id if no scenes are declared. Empty for
 /// reconstructions.
 pub(super) fn flips(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> Vec<FlippedPair> {
-    let id = |row: usize| id(study.table.keys.get(row).episode_id);
+    let id = |row: usize| study.table.keys.get(row).episode_id;
     let by_scene = |block: &Block| Scenes::of(study, block).rows;
     let (old, later) = (by_scene(base), by_scene(new));
     let pairs: Vec<(usize, usize)> = if !study.design.has_pairs() {
@@ -192,7 +179,7 @@ pub(super) fn flips(study: &Study, column: &MetricColumn, [base, new]: [&Block; 
         both.flat_map(|(old, new)| old.iter().copied().zip(new.iter().copied())).collect()
     };
     let played = |row: usize| {
-        let value = column.get(row)?;
+        let value = study.table.decimal(column, row)?;
         Some(Played { episode_id: id(row).to_owned(), value, timesteps: None })
     };
     let flipped = pairs.into_iter().filter_map(|(old, later)| {

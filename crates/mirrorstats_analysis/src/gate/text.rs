@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{FlippedPair, Gate, GateCell, GateSide, GateVerdict, Played};
-use crate::statistics::text::percent;
+use crate::statistics::text::{beside, percent};
 use crate::study::named;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{UNDEFINED, fixed};
@@ -170,8 +170,8 @@ fn side(side: GateSide) -> String {
     let lost = if side.lost > 0 { format!(" ({} lost)", side.lost) } else { String::new() };
     let counted = match (side.successes, side.n) {
         (_, 0) => UNDEFINED.to_owned(),
-        (Some(successes), n) => format!("{successes}/{n}"),
-        (None, n) => format!("{} (n = {n})", fixed(side.mean, 1)),
+        (Some(successes), n) => beside(&format!("{successes}/{n}"), side.unit_mean, 3),
+        (None, n) => beside(&format!("{} (n = {n})", fixed(side.mean, 1)), side.unit_mean, 1),
     };
     counted + &lost
 }

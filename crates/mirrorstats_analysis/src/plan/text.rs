@@ -60,32 +60,25 @@ pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
         (false, false) => "by pairs",
     };
     let at_most = if request.sequential { "at most " } else { "" };
+    let how = format!("with power {power}, {by}{family}");
+    let episodes = |runs: u64| {
+        let (all, seeds) = (counted(seeds * runs, "episode"), counted(seeds, cluster));
+        format!("{at_most}{all} per model and experiment ({runs} for each of {seeds})")
+    };
     match (request.given, test.runs, test.difference) {
-        (Given::Difference(difference), Some(runs), _) => format!(
-            "{at_most}{} per model and experiment ({runs} for each of {}) show a difference of {difference} with power {power}, {by}{family}",
-            counted(seeds * runs, "episode"),
-            counted(seeds, cluster)
-        ),
-        (Given::Difference(difference), None, _) => format!(
-            "no number of runs up to {} episodes shows a difference of {difference} with power {power}, {by}{family}{}",
-            request.most(),
-            if request.clusters.are_units() {
-                format!("; episodes of one {cluster} resemble each other: take more {cluster}s")
-            } else {
-                String::new()
-            }
-        ),
-        (Given::Runs(runs), _, Some(difference)) => format!(
-            "{at_most}{} per model and experiment ({runs} for each of {}) show a difference of {} or more with power {power}, {by}{family}",
-            counted(seeds * runs, "episode"),
-            counted(seeds, cluster),
-            fixed(Some(difference), 3)
-        ),
-        (Given::Runs(runs), _, None) => format!(
-            "{at_most}{} per model and experiment ({runs} for each of {}) show no difference with power {power}, {by}{family}",
-            counted(seeds * runs, "episode"),
-            counted(seeds, cluster)
-        ),
+        (Given::Difference(difference), Some(runs), _) => {
+            format!("{} show a difference of {difference} {how}", episodes(runs))
+        }
+        (Given::Difference(difference), None, _) => {
+            let (most, remedy) =
+                (request.most(), format!("; episodes of one {cluster} resemble each other: take more {cluster}s"));
+            let remedy = if request.clusters.are_units() { &*remedy } else { "" };
+            format!("no number of runs up to {most} episodes shows a difference of {difference} {how}{remedy}")
+        }
+        (Given::Runs(runs), _, Some(difference)) => {
+            format!("{} show a difference of {} or more {how}", episodes(runs), fixed(Some(difference), 3))
+        }
+        (Given::Runs(runs), _, None) => format!("{} show no difference {how}", episodes(runs)),
     }
 }
 

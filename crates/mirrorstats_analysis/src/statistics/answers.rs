@@ -9,15 +9,22 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::compare::{Comparison, Sign};
-use super::losses::LOST;
-use super::{ChanceRow, Contrast, Family, Method, Options, Reach, Role, Selection, Statistics, Units, Verdict};
+use super::comparisons::compare::{Comparison, Sign};
+use super::comparisons::losses::LOST;
+use super::comparisons::matching::singular;
+use super::{
+    ChanceRow, Contrast, DurationRow, Family, Method, Options, OverallRow, PairTest, Reach, Role, Statistics, Touched,
+    Units, Verdict,
+};
+use mirrorstats_exact::chance::with_strategy;
 use mirrorstats_exact::format;
 
 /// The most pairs that an experiment's answer names; others are counted.
 const MOST_NAMED: usize = 6;
 
 const ABOVE_CHANCE: &str = "Who is above chance?";
+
+const WHO_DIFFERS: &str = "Who differs from whom?";
 
 /// One question about one metric, and its answer over all experiments.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -52,6 +59,14 @@ impl Answer {
         let (question, metric, answer) = (question.to_owned(), metric.to_owned(), parts.join("; "));
         (!parts.is_empty()).then(|| Self { question, metric, answer, role: AnswerRole::Secondary, caveats: Vec::new() })
     }
+
+    fn touched(&self) -> Touched {
+        match self.question.as_str() {
+            ABOVE_CHANCE => Touched::Levels,
+            WHO_DIFFERS => Touched::Models,
+            _ => Touched::Experiments,
+        }
+    }
 }
 
 pub(super) fn answers(statistics: &Statistics, options: &Options) -> (Vec<Answer>, usize) {
@@ -62,9 +77,8 @@ pub(super) fn answers(statistics: &Statistics, options: &Options) -> (Vec<Answer
         answers[..=first].rotate_right(1);
         answers[0].role = AnswerRole::Primary;
     }
-    let caveats = caveats(statistics, options);
     for answer in &mut answers {
-        answer.caveats.clone_from(&caveats);
+        answer.caveats = statistics.audit.caveats(answer.touched(), options, !statistics.pooled.is_empty());
     }
     let families = families(statistics, &answers);
     (answers, families)
@@ -84,24 +98,12 @@ fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
     levels.len() + models + overall.len() + conditions.len()
 }
 
-fn caveats(statistics: &Statistics, options: &Options) -> Vec<String> {
-    let selection = statistics.selection.as_ref().map(Selection::phrase);
-    let lost = Some(super::warnings::lost(statistics)).filter(|lost| *lost > 0);
-    let lost = lost.map(|lost| format!("{} lost", format::counted(lost, "episode")));
-    let replies = statistics.replies.as_ref().filter(|replies| replies.unusable > 0);
-    let replies =
-        replies.map(|it| format!("{} of {} gave no decision", it.unusable, format::counted(it.replies, "reply")));
-    let pooled = (!statistics.pooled.is_empty()).then(|| "recordings that differ are pooled".to_owned());
-    let given = options.caveats.iter().cloned();
-    selection.into_iter().chain(pooled).chain(given).chain(lost).chain(replies).collect()
-}
-
 fn unranked(statistics: &Statistics) -> Vec<Answer> {
     let mut answers = Vec::new();
     let confidence = statistics.confidence;
     for metric in &statistics.headline {
         for metric in [metric.as_str()].into_iter().chain(statistics.relations.completed(metric)) {
-            answers.extend(Answer::new(ABOVE_CHANCE, metric, &above(&statistics.chance, metric, confidence)));
+            answers.extend(Answer::new(ABOVE_CHANCE, metric, &above(statistics, metric)));
         }
     }
     for metric in &statistics.headline {
@@ -119,9 +121,13 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
             (_, false) => Some("over all experiments not tested".to_owned()),
             _ if is_unsayable => Some("over all experiments cannot say".to_owned()),
             (all, true) => Some(differing("over all experiments", all, separated) + &unsaid_pairs(&unsettled)),
-        };
-        let parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
-        answers.extend(Answer::new("Who differs from whom?", metric, &parts));
+        }
+        .map(|said| said + &opposite(&overall));
+        let mut parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
+        if parts.is_empty() && statistics.audit.cells.iter().any(|cell| cell.episodes == 0) {
+            parts.push("not tested".to_owned());
+        }
+        answers.extend(Answer::new(WHO_DIFFERS, metric, &parts));
     }
     let question =
         if statistics.is_mirror { "What does the mirror change?" } else { "What does the experiment change?" };
@@ -130,6 +136,19 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
         answers.extend(Answer::new(question, metric, &parts));
     }
     answers
+}
+
+/// The pairs whose difference over all experiments is not that of each.
+fn opposite(overall: &[&OverallRow]) -> String {
+    let crossed: Vec<&&OverallRow> = overall.iter().filter(|row| row.is_crossed).collect();
+    let withheld = crossed.first().map(|row| {
+        let others = if crossed.len() > 1 { format!(" and {} more", crossed.len() - 1) } else { String::new() };
+        format!(", cannot say for {} and {}{others}: opposite in {}", row.first, row.second, row.opposite.join(", "))
+    });
+    let against = overall.iter().filter(|row| row.separated && !row.opposite.is_empty());
+    let against =
+        against.map(|row| format!(", {} and {} the other way in {}", row.first, row.second, row.opposite.join(", ")));
+    withheld.into_iter().chain(against.take(MOST_NAMED)).collect()
 }
 
 fn unsaid_pairs(reasons: &[String]) -> String {
@@ -141,28 +160,59 @@ fn unsaid_pairs(reasons: &[String]) -> String {
     }
 }
 
-fn above(rows: &[ChanceRow], metric: &str, confidence: f64) -> Vec<String> {
+fn above(statistics: &Statistics, metric: &str) -> Vec<String> {
     let mut experiments: IndexMap<&str, Vec<&ChanceRow>> = IndexMap::new();
-    for row in rows.iter().filter(|row| row.metric == metric) {
+    for row in statistics.chance.iter().filter(|row| row.metric == metric) {
         experiments.entry(&row.key.experiment).or_default().push(row);
     }
-    experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows, confidence)).collect()
+    experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows, statistics)).collect()
 }
 
-fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
+/// The name of a model with what a reader must know of its verdict: the means that it rests on, if the count of episodes
+/// points the other way; and the episodes without a decision, which are below chance without a guess.
+fn qualified(row: &ChanceRow, statistics: &Statistics) -> String {
+    let mut notes = Vec::new();
+    let pooled = row.successes as f64 / row.n as f64;
+    let is_above = |rate: f64| rate > row.level.value();
+    if let Some(mean) = row.unit_mean.filter(|mean| is_above(*mean) != is_above(pooled)) {
+        let unit = row.units.as_ref().map_or("unit", |units| singular(&units.name));
+        let mean = format::fixed(Some(mean), 3);
+        notes.push(format!("{mean} by {unit}, {}/{} by episode", row.successes, row.n));
+    }
+    let unfinished = |duration: &&DurationRow| duration.key == row.key && duration.finished < duration.n;
+    let completed: Vec<&str> = statistics.relations.completed(&row.metric).collect();
+    let is_guess = |other: &ChanceRow| {
+        completed.contains(&&*other.metric)
+            && (&other.key, other.level, other.verdict) == (&row.key, row.level, Verdict::Below)
+    };
+    let is_silent = row.verdict == Verdict::Below && !completed.is_empty() && !statistics.chance.iter().any(is_guess);
+    let silent = statistics.durations.iter().find(unfinished).filter(|_| is_silent);
+    if let Some(duration) = silent {
+        let silent = duration.n - duration.finished;
+        notes.push(format!("no decision made in {silent} of {}", format::counted(duration.n, "episode")));
+    }
+    if notes.is_empty() { row.key.name() } else { format!("{} ({})", row.key.name(), notes.join("; ")) }
+}
+
+fn above_in(experiment: &str, rows: &[&ChanceRow], statistics: &Statistics) -> String {
+    let confidence = statistics.confidence;
     let highest = |a: &&&ChanceRow, b: &&&ChanceRow| a.level.value().total_cmp(&b.level.value());
     let level =
         rows.iter().filter(|row| row.role == Role::Chance).max_by(highest).or_else(|| rows.iter().max_by(highest));
     let level = level.map(|row| (row.role, row.level));
     let rows: Vec<_> = rows.iter().filter(|row| Some((row.role, row.level)) == level).collect();
-    let those =
-        |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.key.name()).collect::<Vec<_>>();
+    let those = |verdict| {
+        rows.iter().filter(|row| row.verdict == verdict).map(|row| qualified(row, statistics)).collect::<Vec<_>>()
+    };
     let (above, below) = (those(Verdict::Above), those(Verdict::Below));
     let unsaid: Vec<(String, Units)> =
         rows.iter().filter_map(|row| Some((row.key.name(), row.unsaid(confidence)?))).collect();
-    let reference = level.filter(|(role, _)| *role == Role::Reference);
-    let about =
-        reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
+    let about = match rows.first() {
+        Some(row) if row.role == Role::Reference || row.strategy.is_some() => {
+            format!("{experiment} ({} {})", row.role.name(), with_strategy(row.level, row.strategy.as_deref()))
+        }
+        _ => experiment.to_owned(),
+    };
     if let Some((_, units)) = unsaid.iter().max_by_key(|(_, units)| units.n).filter(|_| unsaid.len() == rows.len()) {
         return format!("{about} {}", cannot_say(units));
     }
@@ -170,9 +220,12 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
     if let Some(units) = ChanceRow::hopeless(&family, confidence) {
         return format!("{about} {} for {}", cannot_say(&units), format::counted(rows.len() as u64, "model"));
     }
-    let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
+    // Qualified names are spelled out.
+    let is_plain = rows.iter().all(|row| qualified(row, statistics) == row.key.name());
+    let all = if is_plain { rows.len() } else { usize::MAX };
+    let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, all)) };
     let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", units.counted()));
-    let verdicts = format!("{about} {}{below}", names(&above, rows.len()));
+    let verdicts = format!("{about} {}{below}", names(&above, all));
     [verdicts].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
 }
 
@@ -197,7 +250,9 @@ fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     };
     let mut tested = comparisons.iter().filter(is_tried).peekable();
     if tested.peek().is_none() {
-        return Some(apart(comparisons).unwrap_or_else(|| "not tested".to_owned()));
+        let selected = comparisons.iter().find_map(|found| found.selected.as_ref());
+        let selected = selected.map(|selected| format!("not tested: {selected}"));
+        return Some(apart(comparisons).or(selected).unwrap_or_else(|| "not tested".to_owned()));
     }
     let too_few = tested.map(|found| unsaid(found)).collect::<Option<Vec<_>>>()?;
     too_few.iter().max_by_key(|units| units.n).map(cannot_say)
@@ -211,7 +266,6 @@ fn apart(comparisons: &[&Comparison]) -> Option<String> {
     Some(format!("{count}not comparable ({setting})"))
 }
 
-/// The reason why no test of a family can show a difference.
 fn unsayable(family: &Family, confidence: f64) -> Option<String> {
     let comparisons: Vec<&Comparison> = family.comparisons().collect();
     untested(&comparisons, confidence).or_else(|| match family.detectable {
@@ -243,7 +297,20 @@ fn differing_in(family: &Family, confidence: f64) -> String {
     let unsettled = unsaid_pairs(&unsaid);
     let differing =
         differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
-    [differing + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
+    let by_unit = family.tests.iter().filter_map(by_unit);
+    [differing + &unsettled].into_iter().chain(by_unit).chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
+}
+
+/// The means of a shown difference, if the counts of episodes point the other way.
+fn by_unit(test: &PairTest) -> Option<String> {
+    let found = test.comparison.separated.then_some(&test.comparison)?;
+    let [first, second] = found.unit_means?.map(|mean| format::fixed(Some(mean), 3));
+    let ([k, l], [m, n]) = (found.successes?, found.n);
+    let is_turned = (k as f64 / m as f64 - l as f64 / n as f64) * found.difference? < 0.0;
+    let unit = found.units.as_ref().map_or("unit", |units| singular(&units.name));
+    is_turned.then(|| {
+        format!("{} and {}: {first} and {second} by {unit}, {k}/{m} and {l}/{n} by episode", test.first, test.second)
+    })
 }
 
 /// The separated pairs, grouped by the better model; `all` is the number of pairs.

@@ -25,7 +25,6 @@ pub struct ComparisonApart {
 }
 
 impl SettingApart {
-    /// The settings of all comparisons, in order.
     pub(super) fn all(statistics: &Statistics) -> Vec<Self> {
         let models = statistics.models.iter().flat_map(|family| {
             let of_test = |test: &super::PairTest| {

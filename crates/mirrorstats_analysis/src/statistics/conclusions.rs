@@ -2,9 +2,10 @@
 
 use indexmap::IndexMap;
 
-use super::chance::own_levels;
+use super::rates::chance::own_levels;
 use super::{ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
 use crate::study::Study;
+use mirrorstats_exact::chance::with_strategy;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_statistics::power::Detectable;
 
@@ -72,7 +73,7 @@ fn against_levels(rows: &[ChanceRow]) -> Vec<String> {
             Role::Chance => "chance",
             Role::Reference => "the reference",
         };
-        let level = format!("{role} ({})", row.level);
+        let level = format!("{role} ({})", with_strategy(row.level, row.strategy.as_deref()));
         groups.entry((&row.key.experiment, &row.metric, level)).or_default().push(row);
     }
     groups.iter().map(|((experiment, metric, level), rows)| level_sentence(experiment, metric, level, rows)).collect()

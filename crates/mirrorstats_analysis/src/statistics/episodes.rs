@@ -80,7 +80,6 @@ impl Replies {
     }
 }
 
-/// The first names, and the number of the others.
 pub(super) fn first_named(names: impl ExactSizeIterator<Item = String>, most: usize) -> String {
     let rest = names.len().saturating_sub(most);
     let first = names.take(most).collect::<Vec<_>>().join("; ");

@@ -19,6 +19,7 @@ pub(crate) mod comparisons {
     pub(super) mod trends;
 }
 mod conclusions;
+pub(crate) mod design_audit;
 mod episodes;
 mod options;
 mod rates {
@@ -37,27 +38,28 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
 pub use apart::SettingApart;
-pub(crate) use cells::FEW;
-pub use cells::{CellRow, ClusterRow, Intervals};
-pub use chance::{ChanceRow, Role, Verdict};
-pub use compare::{Comparison, Method, Sign};
-pub use conditions::Contrast;
-pub use durations::{CorrectRow, DurationRow};
+pub use comparisons::compare::{Comparison, Method, Sign};
+pub use comparisons::conditions::Contrast;
+pub use comparisons::losses::{LossCase, LossCases, LossRow, Losses};
+pub use comparisons::matching::{Matching, Units};
+pub use comparisons::models::{Family, Gap, PairTest, Reach};
+pub use comparisons::retest::RetestRow;
+pub use comparisons::trends::{Dose, TrendRow};
+pub use design_audit::{CellDesign, DesignAudit, DesignCheck, DesignFinding, Touched};
 pub use episodes::{Replies, Selection, UnusableReplies};
-pub use losses::{LossCase, LossCases, LossRow, Losses};
-pub use matching::{Matching, Units};
-pub use models::{Family, Gap, PairTest, Reach};
 pub use options::Options;
-pub use overall::{ImprovementRow, OverallMethod, OverallRow};
-pub use ranks::{RankRow, Ranks};
-pub use retest::RetestRow;
-pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
-pub use trends::{Dose, TrendRow};
+pub(crate) use rates::cells::FEW;
+pub use rates::cells::{CellRow, ClusterRow, Intervals};
+pub use rates::chance::{ChanceRow, Role, Verdict};
+pub use rates::durations::{CorrectRow, DurationRow};
+pub use rates::overall::{ImprovementRow, OverallMethod, OverallRow};
+pub use rates::ranks::{RankRow, Ranks};
+pub use rates::sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
 pub use crate::study::RowKey;
 
-use self::comparisons::{compare, conditions, losses, matching, models, retest, trends};
-use self::rates::{cells, chance, durations, overall, ranks, sequential};
+use self::comparisons::models;
+use self::rates::overall;
 use crate::study::Study;
 use mirrorstats_exact::moments::MomentOverflow;
 use mirrorstats_metric::catalogs::relations::Relations;
@@ -90,6 +92,9 @@ pub struct Statistics {
     /// The settings that keep cells from being compared, each with what it keeps apart; absent if there is none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_comparable: Vec<SettingApart>,
+    /// The design audit: the cells, and what limits comparisons.
+    #[serde(default)]
+    pub audit: DesignAudit,
     /// The declared design.
     pub design: Design,
     /// The consequence of the design, in a sentence.
@@ -149,13 +154,13 @@ impl Statistics {
     /// The statistics of `table`; `cells` are the cells of the same table, in the requested grouping. For a confidence
     /// outside (0, 1), intervals and verdicts are undefined.
     pub fn from_table(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
-        let mut study = Study::from_table(table, options.design, options.lost.as_ref())?;
+        let mut study = Study::from_table(table, options.design, options.lost.as_ref(), None)?;
         study.pool = options.pooled.is_some();
         let confidence = options.confidence;
         let headline = conclusions::headline(&study);
         let asked: &[String] = if options.improvements { &headline } else { &[] };
         let (models, gaps) = models::compared(&study, confidence);
-        let overall = overall::rates(&study, &headline, confidence);
+        let overall = overall::rates(&study, &models, &headline, confidence);
         let mut statistics = Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
@@ -164,6 +169,7 @@ impl Statistics {
             episodes: table.len(),
             selection: options.selection.clone(),
             pooled: options.pooled_in(&study),
+            audit: DesignAudit::of(&study, options),
             design: options.design,
             cells: CellRow::all(&study, cells, confidence),
             chance: ChanceRow::all(&study, confidence),

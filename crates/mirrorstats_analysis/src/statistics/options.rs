@@ -1,6 +1,6 @@
 //! The options of all statistics.
 
-use super::conditions::Contrast;
+use super::comparisons::conditions::Contrast;
 use super::episodes::{Replies, Selection};
 use crate::study::Study;
 use mirrorstats_score::cells::interval::CONFIDENCE;
@@ -24,6 +24,8 @@ pub struct Options {
     pub replies: Option<Replies>,
     /// Further caveats of every answer, such as lost episodes that count as failures.
     pub caveats: Vec<String>,
+    /// Episodes that are copies of others, or may be: a phrase each.
+    pub copies: Vec<String>,
     /// The metric of the primary question in a registered plan; the first headline metric by default.
     pub primary: Option<String>,
     /// True to compute probabilities of improvement. Each one resamples all episodes of two models.
@@ -40,6 +42,7 @@ impl Default for Options {
             pooled: None,
             replies: None,
             caveats: Vec::new(),
+            copies: Vec::new(),
             primary: None,
             improvements: false,
         }

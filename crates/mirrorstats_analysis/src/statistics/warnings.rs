@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::comparisons::matching::Matching;
 use super::episodes::first_named;
-use super::matching::Matching;
 use super::{CellRow, FEW, Gap, Replies, RowKey, Selection, Statistics};
 use mirrorstats_exact::format::{counted, p_value};
 use mirrorstats_statistics::comparisons::holm::level;
@@ -99,7 +99,7 @@ fn few_seeds(statistics: &Statistics) -> Option<String> {
     let verb = if fewest == 1 { "is" } else { "are" };
     Some(format!(
         "{} {verb} too few for a claim about new seeds: no test over fewer than {needed} can reach p = {}. \
-         Tests are by seed; intervals of cells speak of new runs of these seeds.",
+         Tests and intervals are by seed.",
         counted(fewest as u64, "seed"),
         p_value(Some(level)).trim_end_matches('0')
     ))

@@ -9,15 +9,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use polars::prelude::{
     AnyValue, Column, CsvWriter, DataFrame, Engine, IntoLazy as _, JsonFormat, JsonWriter, LazyFrame, ParquetWriter,
-    PlanCallback, PolarsError as Inner, PolarsResult, SerWriter as _, col,
+    PlanCallback, PolarsResult, SerWriter as _, col,
 };
 
 use super::accepted::Kind;
 use super::plan::Planner;
 use super::refused::QueryError;
-use super::relation::{self, Relation};
+use super::relation::{self, Names, Relation};
 use super::run::PolarsError;
 use super::statement::{Asked, Checked, Table};
+use super::value::Value;
 use mirrorstats_metric::syntax::grammar::with_stack;
 use mirrorstats_trace::catch_panic::contained_on_all_threads;
 
@@ -47,8 +48,8 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
         let schema = frame.collect_schema().map_err(PolarsError::from)?;
         let columns = schema.iter().map(|(name, ty)| {
             let (kind, bits) = Kind::of(ty);
-            let (name, inner) = (name.to_string(), name.to_string());
-            relation::Column { table: table.name().to_owned(), name, inner, kind, bits, hidden: false }
+            let value = Value { expr: col(name.as_str()), kind, bits };
+            relation::Column { table: table.name().to_owned(), name: name.to_string(), value, hidden: false }
         });
         let columns = columns.collect();
         relations.insert(table, Relation { frame, columns });
@@ -58,12 +59,13 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
         Asked::Columns(table) => {
             let columns = relations.get(table).into_iter().flat_map(|relation| &relation.columns);
             let (names, types): (Vec<_>, Vec<_>) =
-                columns.map(|column| (column.name.as_str(), sql_type(column.kind, column.bits))).unzip();
+                columns.map(|column| (column.name.as_str(), sql_type(&column.value))).unzip();
             Ok(listed("column_name", names, Some(types))?)
         }
         Asked::Rows(rows) => {
             let planned = with_stack(&query.source.text, || {
-                contained_on_all_threads(|| named(Planner::new(&query.source, &relations).query(rows)?))
+                let names = Names::default();
+                contained_on_all_threads(|| named(Planner::new(&query.source, &relations, &names).query(rows)?))
             });
             planned.map_err(PolarsError::panicked)?
         }
@@ -78,7 +80,7 @@ fn named(relation: Relation) -> Result<LazyFrame, QueryError> {
         let numbered = (1..).map(|number| format!("{}_{number}", column.name));
         let name = std::iter::once(column.name.clone()).chain(numbered).find(|name| !taken.contains(name));
         let name = name.unwrap_or_default();
-        chosen.push(col(column.inner.as_str()).alias(name.as_str()));
+        chosen.push(column.value.expr.clone().alias(name.as_str()));
         taken.insert(name);
     }
     let mut frame = relation.frame.select(chosen);
@@ -98,50 +100,45 @@ fn listed<T: AsRef<str>>(
     Ok(DataFrame::new(texts.len(), columns)?.lazy())
 }
 
-fn sql_type(kind: Kind, bits: u32) -> &'static str {
-    match (kind, bits) {
+fn sql_type(value: &Value) -> &'static str {
+    match (value.kind, value.bits) {
         (Kind::Int, 7) => "TINYINT",
         (Kind::Int, 31) => "INTEGER",
-        _ => kind.sql(),
+        (kind, _) => kind.sql(),
     }
 }
 
-pub fn write(frame: LazyFrame, format: Format, out: impl Write + Send + 'static) -> Result<(), PolarsError> {
-    let mut frame = frame;
+pub fn write<W: Write + Send + 'static>(mut frame: LazyFrame, format: Format, out: W) -> Result<(), PolarsError> {
     let schema = frame.collect_schema()?;
     match format {
         Format::Csv => {
             let writer = CsvWriter::new(out).batched(&schema)?;
-            let writer = each(frame, writer, |writer, batch| Ok(writer.write_batch(&batch)?))?;
-            with(writer, |mut writer| Ok(writer.finish()?))
+            each(frame, writer, |writer, batch| writer.write_batch(&batch), |mut writer| writer.finish())
         }
         Format::JsonLines => {
-            let writer = each(frame, out, |out, mut batch| {
-                Ok(JsonWriter::new(out).with_json_format(JsonFormat::JsonLines).finish(&mut batch)?)
-            })?;
-            with(writer, |mut out| Ok(out.flush().map_err(Inner::from)?))
+            let write = |out: &mut W, mut batch: DataFrame| {
+                JsonWriter::new(out).with_json_format(JsonFormat::JsonLines).finish(&mut batch)
+            };
+            each(frame, out, write, |mut out| Ok(out.flush()?))
         }
         Format::Parquet => {
             let writer = ParquetWriter::new(out).batched(&schema)?;
-            let writer = each(frame, writer, |writer, batch| Ok(writer.write_batch(&batch)?))?;
-            with(writer, |writer| Ok(writer.finish().map(|_| ())?))
+            each(frame, writer, |writer, batch| writer.write_batch(&batch), |writer| writer.finish().map(drop))
         }
     }
 }
 
 /// The first and last rows, `most` together; all rows without a limit.
-pub fn excerpt(frame: LazyFrame, most: Option<usize>) -> Result<Excerpt, PolarsError> {
-    let mut frame = frame;
+pub fn excerpt(mut frame: LazyFrame, most: Option<usize>) -> Result<Excerpt, PolarsError> {
     let schema = frame.collect_schema()?;
     let (head, tail) = most.map_or((usize::MAX, 0), |most| (most.div_ceil(2), most / 2));
     let columns = schema.iter().map(|(name, ty)| (name.to_string(), ty.to_string())).collect();
     let empty = Excerpt { columns, ..Excerpt::default() };
-    let filled = each(frame, empty, move |excerpt, batch| excerpt.add(&batch, head, tail))?;
-    with(filled, Ok)
+    each(frame, empty, move |excerpt, batch| excerpt.add(&batch, head, tail), Ok)
 }
 
 impl Excerpt {
-    fn add(&mut self, batch: &DataFrame, head: usize, tail: usize) -> Result<(), PolarsError> {
+    fn add(&mut self, batch: &DataFrame, head: usize, tail: usize) -> PolarsResult<()> {
         let height = batch.height();
         let skipped = height.saturating_sub(tail);
         for row in 0..height {
@@ -159,7 +156,7 @@ impl Excerpt {
     }
 }
 
-fn cells(batch: &DataFrame, row: usize) -> Result<Vec<Option<String>>, PolarsError> {
+fn cells(batch: &DataFrame, row: usize) -> PolarsResult<Vec<Option<String>>> {
     let cell = |value: AnyValue| match value {
         AnyValue::Null => None,
         AnyValue::String(text) => Some(text.to_owned()),
@@ -171,12 +168,13 @@ fn cells(batch: &DataFrame, row: usize) -> Result<Vec<Option<String>>, PolarsErr
     batch.columns().iter().map(|column| Ok(cell(column.get(row)?))).collect()
 }
 
-/// Runs a frame and passes each batch to `work`, in order; returns `into`.
-fn each<T: Send + 'static>(
+/// Runs a frame, passes each batch to `work`, in order, and then finishes.
+fn each<T: Send + 'static, R>(
     frame: LazyFrame,
     into: T,
-    work: impl Fn(&mut T, DataFrame) -> Result<(), PolarsError> + Send + Sync + 'static,
-) -> Result<T, PolarsError> {
+    work: impl Fn(&mut T, DataFrame) -> PolarsResult<()> + Send + Sync + 'static,
+    finish: impl FnOnce(T) -> PolarsResult<R>,
+) -> Result<R, PolarsError> {
     let shared = Arc::new(Mutex::new((Some(into), None)));
     let (inner, work) = (Arc::clone(&shared), Arc::new(work));
     let receive = move |mut batch: DataFrame| {
@@ -199,8 +197,10 @@ fn each<T: Send + 'static>(
     }
     let mut state = shared.lock().unwrap_or_else(PoisonError::into_inner);
     match (state.0.take(), state.1.take()) {
-        (_, Some(error)) => Err(error),
-        (Some(into), None) => Ok(into),
+        (_, Some(error)) => Err(error.into()),
+        (Some(into), None) => {
+            contained_on_all_threads(|| finish(into)).map_err(PolarsError::panicked)?.map_err(PolarsError::from)
+        }
         (None, None) => Err(PolarsError::Failed("its answer is gone".to_owned())),
     }
 }
@@ -214,8 +214,4 @@ fn run_into(
     let run = || sink.collect_with_engine(Engine::Streaming);
     contained_on_all_threads(run).map_err(PolarsError::panicked)??;
     Ok(())
-}
-
-fn with<T, R>(into: T, finish: impl FnOnce(T) -> Result<R, PolarsError>) -> Result<R, PolarsError> {
-    contained_on_all_threads(|| finish(into)).map_err(PolarsError::panicked)?
 }

@@ -97,25 +97,39 @@ fn cased(value: &Value, of: fn(char) -> Vec<char>) -> Expr {
     value.to(Kind::Text).map(all, |_: &Schema, field: &Field| Ok(Field::new(field.name().clone(), DataType::String)))
 }
 
+type OfParts = Box<dyn FnOnce(&[Expr]) -> Value>;
+
 /// An aggregate: parts that Polars computes, and the value of those.
 pub(super) struct Aggregate {
     pub(super) parts: Vec<Expr>,
-    pub(super) value: fn(&[Expr], u32) -> Value,
-    pub(super) bits: u32,
+    pub(super) value: OfParts,
+}
+
+fn made(parts: Vec<Expr>, value: impl FnOnce(&[Expr]) -> Value + 'static) -> Aggregate {
+    Aggregate { parts, value: Box::new(value) }
+}
+
+fn single(part: Expr, kind: Kind, bits: u32) -> Aggregate {
+    made(vec![part], move |parts| Value { expr: parts[0].clone(), kind, bits })
+}
+
+/// A number of rows, which 31 bits hold.
+fn counted(part: Expr) -> Aggregate {
+    single(part.cast(DataType::Int64), Kind::Int, 31)
+}
+
+pub(super) fn distinct_count(column: &Value) -> Aggregate {
+    counted(column.expr.clone().drop_nulls().n_unique())
 }
 
 /// The aggregate of a column; `None` for kinds that do not fit.
 pub(super) fn aggregate(name: &str, of: &Value) -> Option<Aggregate> {
     let column = wide(of);
-    let float = |part: Expr| made(vec![part], |parts, _| Value::new(parts[0].clone(), Kind::Float));
+    let float = |part: Expr| single(part, Kind::Float, 0);
     match name {
-        "count" => Some(made(vec![column.count().cast(DataType::Int64)], |parts, _| Value::int(parts[0].clone(), 31))),
+        "count" => Some(counted(column.count())),
         "min" | "max" => extreme(name, of, column.clone().min(), column.clone().max(), column.is_nan().any(true)),
-        "sum" => Some(Aggregate {
-            parts: vec![column.clone().sum(), column.clone().count(), of.float().sum()],
-            value: total(of.kind)?,
-            bits: sum_bits(of.bits),
-        }),
+        "sum" => total(of, [column.clone().sum(), column.count(), of.float().sum()]),
         _ if !of.kind.is_number() && of.kind != Kind::Real => None,
         "avg" | "mean" => Some(float(of.float().mean())),
         // DuckDB interpolates a FLOAT in 32 bits.
@@ -126,22 +140,20 @@ pub(super) fn aggregate(name: &str, of: &Value) -> Option<Aggregate> {
     }
 }
 
-fn made(parts: Vec<Expr>, value: fn(&[Expr], u32) -> Value) -> Aggregate {
-    Aggregate { parts, value, bits: 0 }
-}
-
-fn total(kind: Kind) -> Option<fn(&[Expr], u32) -> Value> {
-    fn defined(parts: &[Expr], value: Expr) -> Expr {
-        when(parts[1].clone().gt(lit(0))).then(value).otherwise(lit(NULL))
-    }
-    Some(match kind {
-        Kind::Int => |parts, bits| {
-            let sum = guarded(parts[0].clone(), parts[2].clone(), bits);
-            Value { expr: defined(parts, sum.expr), ..sum }
-        },
-        Kind::Decimal => |parts, _| Value { expr: defined(parts, parts[2].clone()), kind: Kind::Decimal, bits: 1 },
-        Kind::Float | Kind::Real => |parts, _| Value::new(defined(parts, parts[2].clone()), Kind::Float),
-        _ => return None,
+/// A sum as an integer and as a float; null without a value.
+fn total(of: &Value, [sum, count, float]: [Expr; 3]) -> Option<Aggregate> {
+    let (kind, bits) = (of.kind, sum_bits(of.bits));
+    let is_number = matches!(kind, Kind::Int | Kind::Decimal | Kind::Float | Kind::Real);
+    is_number.then(|| {
+        made(vec![sum, count, float], move |parts| {
+            let float = parts[2].clone();
+            let sum = match kind {
+                Kind::Int => guarded(parts[0].clone(), float, bits),
+                Kind::Decimal => Value { expr: float, kind, bits: 1 },
+                _ => Value::new(float, Kind::Float),
+            };
+            Value { expr: when(parts[1].clone().gt(lit(0))).then(sum.expr).otherwise(lit(NULL)), ..sum }
+        })
     })
 }
 
@@ -149,21 +161,13 @@ fn total(kind: Kind) -> Option<fn(&[Expr], u32) -> Value> {
 fn extreme(name: &str, of: &Value, least: Expr, greatest: Expr, nan: Expr) -> Option<Aggregate> {
     let part = if name == "min" { least } else { greatest };
     Some(match (of.kind, name) {
-        (Kind::Float, "max") => made(vec![part, nan], |parts, _| {
+        (Kind::Null | Kind::Other, _) => return None,
+        (Kind::Float, "max") => made(vec![part, nan], |parts| {
             let expr = when(parts[1].clone()).then(lit(f64::NAN)).otherwise(parts[0].clone());
             Value::new(expr, Kind::Float)
         }),
-        (Kind::Float, _) => made(vec![part], |parts, _| Value::new(parts[0].clone(), Kind::Float)),
-        (Kind::Int, _) => {
-            Aggregate { parts: vec![part], value: |parts, bits| Value::int(parts[0].clone(), bits), bits: of.bits }
-        }
-        (Kind::Bool, _) => made(vec![part], |parts, _| Value::bool(parts[0].clone())),
-        (Kind::Text, _) => made(vec![part], |parts, _| Value::new(parts[0].clone(), Kind::Text)),
-        (Kind::Decimal, _) => {
-            made(vec![part], |parts, _| Value { expr: parts[0].clone(), kind: Kind::Decimal, bits: 1 })
-        }
-        (Kind::Real, _) => made(vec![part], |parts, _| Value::new(parts[0].clone(), Kind::Real)),
-        (Kind::Null | Kind::Other, _) => return None,
+        (Kind::Decimal, _) => single(part, Kind::Decimal, 1),
+        (kind, _) => single(part, kind, of.bits),
     })
 }
 
@@ -174,16 +178,10 @@ pub(super) fn running(name: &str, of: &Value) -> Option<Aggregate> {
     let floats = || of.float().fill_null(lit(0.0)).cum_sum(false);
     let last = |part: Expr| part.fill_null_with_strategy(FillNullStrategy::Forward(None));
     match name {
-        "count" => {
-            Some(made(vec![column.cum_count(false).cast(DataType::Int64)], |parts, _| Value::int(parts[0].clone(), 31)))
-        }
+        "count" => Some(counted(column.cum_count(false))),
         _ if !matches!(of.kind, Kind::Int | Kind::Float) => None,
-        "sum" => Some(Aggregate {
-            parts: vec![filled().cum_sum(false), column.clone().cum_count(false), floats()],
-            value: total(of.kind)?,
-            bits: sum_bits(of.bits),
-        }),
-        "avg" | "mean" => Some(made(vec![floats(), column.cum_count(false)], |parts, _| {
+        "sum" => total(of, [filled().cum_sum(false), column.cum_count(false), floats()]),
+        "avg" | "mean" => Some(made(vec![floats(), column.cum_count(false)], |parts| {
             let mean = parts[0].clone() / parts[1].clone().cast(DataType::Float64);
             Value::new(when(parts[1].clone().gt(lit(0))).then(mean).otherwise(lit(NULL)), Kind::Float)
         })),

@@ -1,8 +1,20 @@
-//! The names that DuckDB gives to columns without one.
+//! Names of columns in a query's text: by number, and those that DuckDB gives to columns without one.
 
 use std::ops::ControlFlow;
 
-use sqlparser::ast::{Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, Ident, visit_expressions_mut};
+use sqlparser::ast::{
+    Expr, Function, FunctionArg, FunctionArgExpr, FunctionArguments, Ident, UnaryOperator, Value, ValueWithSpan,
+    visit_expressions_mut,
+};
+
+/// The number that is written as an integer, such as the position of a column.
+pub(super) fn integer(ast: &Expr) -> Option<i64> {
+    match ast {
+        Expr::Value(ValueWithSpan { value: Value::Number(text, false), .. }) => text.parse().ok(),
+        Expr::UnaryOp { op: UnaryOperator::Plus, expr } => integer(expr),
+        _ => None,
+    }
+}
 
 pub(super) fn column_name(expr: &Expr) -> String {
     match expr {

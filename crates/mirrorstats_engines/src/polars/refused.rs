@@ -1,11 +1,14 @@
 //! A query that cannot be answered: a mistake in it, or a construct that only DuckDB answers.
 
+use std::fmt::Display;
 use std::sync::Arc;
 
+use sqlparser::ast::Spanned;
 use sqlparser::tokenizer::Span;
 
 use super::run::PolarsError;
-use mirrorstats_metric::syntax::grammar::bytes_of;
+use super::value::Value;
+use mirrorstats_metric::syntax::grammar::{bytes_of, shortened};
 use mirrorstats_toml_spec::{Fault, Faults, Place, Source};
 
 #[derive(Debug, thiserror::Error)]
@@ -21,14 +24,44 @@ pub enum QueryError {
 
 pub(super) type QueryResult<T> = Result<T, QueryError>;
 
-pub(super) fn fault(source: &Arc<Source>, span: Span, message: impl Into<String>) -> Fault {
-    Fault::new(Place { source: Arc::clone(source), span: bytes_of(&source.text, span) }, message)
+impl From<Fault> for QueryError {
+    fn from(fault: Fault) -> Self {
+        Self::Faults(Faults(vec![fault]))
+    }
 }
 
-pub(super) fn wrong(source: &Arc<Source>, span: Span, message: impl Into<String>, help: Option<String>) -> QueryError {
-    QueryError::Faults(Faults(vec![fault(source, span, message).help_if(help)]))
-}
+/// The text of a query, for errors at their places.
+#[derive(Clone, Copy)]
+pub(super) struct Text<'s>(pub(super) &'s Arc<Source>);
 
-pub(super) fn unsupported(source: &Arc<Source>, span: Span, what: impl std::fmt::Display) -> QueryError {
-    QueryError::Unsupported(Box::new(fault(source, span, format!("`query` does not support {what}"))))
+impl Text<'_> {
+    pub(super) fn bytes(self, span: Span) -> std::ops::Range<usize> {
+        bytes_of(&self.0.text, span)
+    }
+
+    pub(super) fn fault_at(self, span: std::ops::Range<usize>, message: impl Into<String>) -> Fault {
+        Fault::new(Place { source: Arc::clone(self.0), span }, message)
+    }
+
+    pub(super) fn fault(self, span: Span, message: impl Into<String>) -> Fault {
+        self.fault_at(self.bytes(span), message)
+    }
+
+    pub(super) fn unsupported<T>(self, span: Span, what: impl Display) -> QueryResult<T> {
+        Err(QueryError::Unsupported(Box::new(self.fault(span, format!("`query` does not support {what}")))))
+    }
+
+    pub(super) fn refuse_at<T>(self, span: Span, sql: impl Display) -> QueryResult<T> {
+        self.unsupported(span, format!("`{}`", shortened(&sql.to_string())))
+    }
+
+    pub(super) fn refuse<T>(self, sql: &(impl Display + Spanned)) -> QueryResult<T> {
+        self.refuse_at(sql.span(), sql)
+    }
+
+    /// Refuses an operation on kinds that do not fit.
+    pub(super) fn unfit<T>(self, sql: &(impl Display + Spanned), values: &[Value]) -> QueryResult<T> {
+        let kinds = values.iter().map(|value| value.kind.sql()).collect::<Vec<_>>().join(", ");
+        self.unsupported(sql.span(), format!("`{}` of {kinds}", shortened(&sql.to_string())))
+    }
 }

@@ -1,8 +1,8 @@
 //! The expressions of one SELECT: names, kinds, aggregates and windows. What has no arm here is refused.
 
-use std::sync::Arc;
+use std::ops::Range;
 
-use polars::prelude::{Expr, NULL, lit, when};
+use polars::prelude::{Expr, NULL, Scalar, Series, lit, when};
 use sqlparser::ast::{
     BinaryOperator, CaseWhen, CastKind, CeilFloorKind, DataType, Expr as Ast, Ident, Query, Spanned as _,
     UnaryOperator, Value as Literal, ValueWithSpan,
@@ -10,15 +10,11 @@ use sqlparser::ast::{
 use sqlparser::tokenizer::Span;
 
 use super::accepted::{CASTS, Kind};
-use super::functions::scalar;
-use super::plan::Planner;
-use super::refused::{QueryError, QueryResult, unsupported, wrong};
-use super::relation::{Column, Found, find};
+use super::refused::{QueryError, QueryResult, Text};
+use super::relation::{Column, Found, Names, Order, Relation, find};
+use super::run::{self, PolarsError};
 use super::value::{Value, arithmetic, balanced, common, compare, one_of};
-use super::windows::Window;
-use mirrorstats_exact::suggest::nearest;
-use mirrorstats_metric::syntax::grammar::shortened;
-use mirrorstats_toml_spec::Source;
+use mirrorstats_exact::suggest::did_you_mean;
 
 /// Polars plans by recursion.
 const DEEPEST: usize = 100;
@@ -32,8 +28,19 @@ pub(super) struct Key {
     pub(super) grouped: Value,
 }
 
+pub(super) struct Window {
+    pub(super) prepared: Vec<Expr>,
+    pub(super) order: Vec<Order>,
+    /// New columns. A step may read the columns of the step before it.
+    pub(super) steps: Vec<Vec<Expr>>,
+}
+
+type Subquery<'p> = Box<dyn FnMut(&Query) -> QueryResult<Relation> + 'p>;
+
 pub(super) struct Scope<'p, 's> {
-    pub(super) planner: &'p mut Planner<'s>,
+    pub(super) text: Text<'s>,
+    pub(super) names: &'s Names,
+    subquery: Subquery<'p>,
     pub(super) columns: Vec<Column>,
     /// Columns of a select by their aliases.
     pub(super) aliases: Vec<(String, Ast)>,
@@ -44,31 +51,14 @@ pub(super) struct Scope<'p, 's> {
     pub(super) prepared: Vec<Expr>,
     pub(super) aggregates: Vec<Expr>,
     pub(super) windows: Vec<Window>,
-    pub(super) depth: usize,
+    depth: usize,
 }
 
 impl<'p, 's> Scope<'p, 's> {
-    pub(super) fn new(planner: &'p mut Planner<'s>, columns: Vec<Column>) -> Self {
+    pub(super) fn new(text: Text<'s>, names: &'s Names, columns: Vec<Column>, subquery: Subquery<'p>) -> Self {
         let (aliases, prepared, aggregates, windows) = Default::default();
-        Self { planner, columns, aliases, keys: None, rows_of: None, prepared, aggregates, windows, depth: 0 }
-    }
-
-    pub(super) fn source(&self) -> &Arc<Source> {
-        self.planner.source
-    }
-
-    pub(super) fn unsupported<T>(&self, ast: &Ast) -> QueryResult<T> {
-        Err(unsupported(self.source(), ast.span(), format!("`{}`", shortened(&ast.to_string()))))
-    }
-
-    pub(super) fn wrong<T>(&self, span: Span, message: impl Into<String>, help: Option<String>) -> QueryResult<T> {
-        Err(wrong(self.source(), span, message, help))
-    }
-
-    /// Refuses kinds that do not fit.
-    pub(super) fn unfit<T>(&self, ast: &Ast, values: &[Value]) -> QueryResult<T> {
-        let kinds = values.iter().map(|value| value.kind.sql()).collect::<Vec<_>>().join(", ");
-        Err(unsupported(self.source(), ast.span(), format!("`{}` of {kinds}", shortened(&ast.to_string()))))
+        let (keys, rows_of) = (None, None);
+        Self { text, names, subquery, columns, aliases, keys, rows_of, prepared, aggregates, windows, depth: 0 }
     }
 
     /// Runs work in which aggregates are refused.
@@ -86,7 +76,8 @@ impl<'p, 's> Scope<'p, 's> {
     pub(super) fn value(&mut self, ast: &Ast) -> QueryResult<Value> {
         self.depth += 1;
         if self.depth > DEEPEST {
-            return self.wrong(ast.span(), "the query is nested too deeply", Some("name parts of it with WITH".into()));
+            let fault = self.text.fault(ast.span(), "the query is nested too deeply");
+            return Err(fault.help("name parts of it with WITH").into());
         }
         let value = self.key(ast).map_or_else(|| self.expression(ast), Ok);
         self.depth -= 1;
@@ -97,7 +88,7 @@ impl<'p, 's> Scope<'p, 's> {
         let keys = self.keys.as_ref().filter(|_| self.rows_of.is_none())?;
         let row = match ast {
             Ast::Identifier(name) => match find(&self.columns, None, &name.value) {
-                Found::One(column) => Some(column.value()),
+                Found::One(column) => Some(column.value.clone()),
                 _ => None,
             },
             Ast::CompoundIdentifier(_) => self.compound(ast).ok(),
@@ -113,7 +104,7 @@ impl<'p, 's> Scope<'p, 's> {
             Ast::Identifier(name) => self.identifier(ast, name),
             Ast::CompoundIdentifier(parts) => {
                 let value = self.compound(ast)?;
-                parts.last().map_or_else(|| self.unsupported(ast), |name| self.ungrouped(name, value))
+                parts.last().map_or_else(|| self.text.refuse(ast), |name| self.ungrouped(name, value))
             }
             Ast::Value(literal) => self.literal(ast, literal),
             Ast::BinaryOp { left, op: op @ (BinaryOperator::And | BinaryOperator::Or), right } => {
@@ -158,12 +149,13 @@ impl<'p, 's> Scope<'p, 's> {
                 self.call(ast, "trim", &[expr])
             }
             Ast::Function(function) => self.function(ast, function),
-            Ast::Subquery(query) => self.alone(query, Planner::scalar),
+            Ast::Subquery(query) => self.alone(query, Self::scalar),
             Ast::Exists { subquery, negated } => {
-                let exists = self.alone(subquery, Planner::exists)?;
-                Ok(Value::bool(lit(exists != *negated)))
+                let has_rows =
+                    |_: &Self, _: &Query, found: Relation| Ok(run::collect(found.frame.limit(1))?.height() > 0);
+                Ok(Value::bool(lit(self.alone(subquery, has_rows)? != *negated)))
             }
-            _ => self.unsupported(ast),
+            _ => self.text.refuse(ast),
         }
     }
 
@@ -171,10 +163,11 @@ impl<'p, 's> Scope<'p, 's> {
     fn alone<T>(
         &mut self,
         query: &Query,
-        run: impl FnOnce(&mut Planner<'s>, &Query) -> QueryResult<T>,
+        read: impl FnOnce(&Self, &Query, Relation) -> QueryResult<T>,
     ) -> QueryResult<T> {
         let remedy = "ask with a JOIN or a table of WITH";
-        run(self.planner, query).map_err(|error| match error {
+        let found = (self.subquery)(query).and_then(|relation| read(self, query, relation));
+        found.map_err(|error| match error {
             QueryError::Faults(mut faults) => {
                 let Some(mut fault) = faults.0.pop() else { return QueryError::Faults(faults) };
                 fault.message = format!("a subquery runs by itself first: {}", fault.message);
@@ -185,10 +178,35 @@ impl<'p, 's> Scope<'p, 's> {
         })
     }
 
+    /// The value of a subquery's only row; null without a row.
+    fn scalar(&self, query: &Query, relation: Relation) -> QueryResult<Value> {
+        let (column, found) = self.column(query, relation)?;
+        if found.len() > 1 {
+            let message = format!("it is in the place of a value and has {} rows", found.len());
+            return Err(self.text.fault(query.span(), message).help("add LIMIT 1 or an aggregate").into());
+        }
+        if found.is_empty() {
+            return Ok(Value { expr: lit(NULL).cast(column.kind.wide()), ..column });
+        }
+        let value = found.get(0).map_err(PolarsError::from)?.into_static();
+        Ok(Value { expr: lit(Scalar::new(found.dtype().clone(), value)), ..column })
+    }
+
+    /// The rows of a subquery's only column.
+    fn column(&self, query: &Query, relation: Relation) -> QueryResult<(Value, Series)> {
+        let [column] = relation.columns.as_slice() else {
+            let message = format!("it is in the place of a value and has {} columns", relation.columns.len());
+            return Err(self.text.fault(query.span(), message).help("select one column").into());
+        };
+        let value = column.value.clone();
+        let found = run::collect(relation.frame.select([value.expr.clone()]))?;
+        Ok((value, found.columns()[0].as_materialized_series().clone()))
+    }
+
     fn identifier(&mut self, ast: &Ast, name: &Ident) -> QueryResult<Value> {
         match find(&self.columns, None, &name.value) {
             Found::One(column) => {
-                let value = column.value();
+                let value = column.value.clone();
                 self.ungrouped(name, value)
             }
             Found::Several => self.ambiguous(name),
@@ -206,31 +224,43 @@ impl<'p, 's> Scope<'p, 's> {
         let tables = self.columns.iter().filter(|column| column.name.eq_ignore_ascii_case(&name.value));
         let one = |column: &Column| format!("{}.{}", column.table, column.name);
         let help = format!("write one of {}", tables.map(one).collect::<Vec<_>>().join(", "));
-        self.wrong(name.span, format!("several tables have a column `{}`", name.value), Some(help))
+        Err(self.text.fault(name.span, format!("several tables have a column `{}`", name.value)).help(help).into())
     }
 
     fn compound(&self, ast: &Ast) -> QueryResult<Value> {
-        let Ast::CompoundIdentifier(parts) = ast else { return self.unsupported(ast) };
-        let [table, name] = parts.as_slice() else { return self.unsupported(ast) };
+        let Ast::CompoundIdentifier(parts) = ast else { return self.text.refuse(ast) };
+        let [table, name] = parts.as_slice() else { return self.text.refuse(ast) };
         match find(&self.columns, Some(&table.value), &name.value) {
-            Found::One(column) => Ok(column.value()),
+            Found::One(column) => Ok(column.value.clone()),
             Found::Several => self.ambiguous(name),
             Found::None if self.columns.iter().any(|column| column.table.eq_ignore_ascii_case(&table.value)) => {
                 self.unknown(name)
             }
-            Found::None => self.wrong(table.span, format!("unknown table `{}`", table.value), None),
+            Found::None => Err(self.text.fault(table.span, format!("unknown table `{}`", table.value)).into()),
         }
     }
 
     fn unknown<T>(&self, name: &Ident) -> QueryResult<T> {
         let columns: Vec<&str> = self.columns.iter().map(|column| column.name.as_str()).collect();
-        let message = format!("unknown column `{}`", name.value);
-        if let Some((span, quoted)) = self.planner.unquoted(name.span, &columns) {
-            let help = format!("write \"{quoted}\" in double quotes: its name is more than letters, digits and `_`");
-            return Err(self.planner.wrong_at(span, message, help));
+        let (mut span, mut help) = (self.text.bytes(name.span), None);
+        if let Some((whole, quoted)) = self.unquoted(span.start, &columns) {
+            help = Some(format!("write \"{quoted}\" in double quotes: its name is more than letters, digits and `_`"));
+            span = whole;
         }
-        let near = nearest(&name.value, columns.iter().copied()).map(|near| format!("did you mean `{near}`?"));
-        self.wrong(name.span, message, Some(near.unwrap_or_else(|| format!("columns are {}", columns.join(", ")))))
+        let near = || did_you_mean(&name.value, columns.iter().copied());
+        let help = help.or_else(near).unwrap_or_else(|| format!("columns are {}", columns.join(", ")));
+        Err(self.text.fault_at(span, format!("unknown column `{}`", name.value)).help(help).into())
+    }
+
+    /// The column whose name contains an unknown name, because it is not quoted.
+    fn unquoted<'c>(&self, start: usize, columns: &[&'c str]) -> Option<(Range<usize>, &'c str)> {
+        let text = &self.text.0.text;
+        let is_word = |name: &str| name.chars().all(|c| c.is_alphanumeric() || c == '_');
+        columns.iter().filter(|column| !is_word(column)).find_map(|column| {
+            let mut spans = text.match_indices(column).map(|(at, _)| at..at + column.len());
+            let span = spans.find(|span| span.contains(&start) && !text[..span.start].ends_with('"'))?;
+            Some((span, *column))
+        })
     }
 
     /// Refuses a column whose type queries do not read.
@@ -238,8 +268,8 @@ impl<'p, 's> Scope<'p, 's> {
         if kind != Kind::Other {
             return Ok(());
         }
-        let what = format!("the column `{name}`: expected true or false, a number or a text, found another type");
-        Err(unsupported(self.source(), span, what))
+        let expected = "expected true or false, a number or a text, found another type";
+        self.text.unsupported(span, format!("the column `{name}`: {expected}"))
     }
 
     /// Refuses the column of a row where groups are meant.
@@ -250,7 +280,7 @@ impl<'p, 's> Scope<'p, 's> {
                 let (name, span) = (&name.value, name.span);
                 let without = if keys.is_empty() { "without GROUP BY" } else { "and not in GROUP BY" };
                 let message = format!("the column `{name}` is used beside an aggregate {without}");
-                self.wrong(span, message, Some(format!("add it to GROUP BY, or write max({name})")))
+                Err(self.text.fault(span, message).help(format!("add it to GROUP BY, or write max({name})")).into())
             }
             _ => Ok(value),
         }
@@ -262,7 +292,7 @@ impl<'p, 's> Scope<'p, 's> {
             Literal::Boolean(value) => Ok(Value::bool(lit(*value))),
             Literal::SingleQuotedString(text) => Ok(Value::new(lit(text.clone()), Kind::Text)),
             Literal::Number(text, false) => self.number(ast, text),
-            _ => self.unsupported(ast),
+            _ => self.text.refuse(ast),
         }
     }
 
@@ -277,7 +307,7 @@ impl<'p, 's> Scope<'p, 's> {
                 let inexact = (number * 1024.0).fract() != 0.0;
                 Ok(Value { expr: lit(number), kind: Kind::Decimal, bits: inexact.into() })
             }
-            _ => self.unsupported(ast),
+            _ => self.text.refuse(ast),
         }
     }
 
@@ -294,12 +324,16 @@ impl<'p, 's> Scope<'p, 's> {
         parts.push(self.truth(rest)?);
         parts.reverse();
         let join = if *op == BinaryOperator::And { Expr::and } else { Expr::or };
-        balanced(parts, join).map_or_else(|| self.unsupported(left), |expr| Ok(Value::bool(expr)))
+        balanced(parts, join).map_or_else(|| self.text.refuse(left), |expr| Ok(Value::bool(expr)))
     }
 
     pub(super) fn truth(&mut self, ast: &Ast) -> QueryResult<Expr> {
         let value = self.value(ast)?;
-        if matches!(value.kind, Kind::Bool | Kind::Null) { Ok(value.to(Kind::Bool)) } else { self.unfit(ast, &[value]) }
+        if matches!(value.kind, Kind::Bool | Kind::Null) {
+            Ok(value.to(Kind::Bool))
+        } else {
+            self.text.unfit(ast, &[value])
+        }
     }
 
     fn binary(&mut self, ast: &Ast, left: &Ast, op: &BinaryOperator, right: &Ast) -> QueryResult<Value> {
@@ -313,7 +347,7 @@ impl<'p, 's> Scope<'p, 's> {
             }
             _ => None,
         };
-        value.map_or_else(|| self.unfit(ast, &[left, right]), Ok)
+        value.map_or_else(|| self.text.unfit(ast, &[left, right]), Ok)
     }
 
     fn unary(&mut self, ast: &Ast, op: UnaryOperator, inner: &Ast) -> QueryResult<Value> {
@@ -324,13 +358,13 @@ impl<'p, 's> Scope<'p, 's> {
         match (op, value.kind, &value.expr) {
             (UnaryOperator::Minus, Kind::Int, _) => {
                 let zero = Value::int(lit(0_i64), 0);
-                arithmetic(&zero, &BinaryOperator::Minus, &value).map_or_else(|| self.unsupported(ast), Ok)
+                arithmetic(&zero, &BinaryOperator::Minus, &value).map_or_else(|| self.text.refuse(ast), Ok)
             }
             (UnaryOperator::Minus, Kind::Decimal | Kind::Float, _) => {
                 let negated = value.number().map_or_else(|| value.float() * lit(-1.0), |number| lit(-number));
                 Ok(Value { expr: negated, ..value })
             }
-            _ => self.unfit(ast, &[value]),
+            _ => self.text.unfit(ast, &[value]),
         }
     }
 
@@ -343,14 +377,14 @@ impl<'p, 's> Scope<'p, 's> {
     fn distinct(&mut self, ast: &Ast, left: &Ast, right: &Ast, wanted: bool) -> QueryResult<Value> {
         let values = [self.value(left)?, self.value(right)?];
         let kind = common(&values).filter(|_| compare(&values[0], &BinaryOperator::Eq, &values[1]).is_some());
-        let Some(kind) = kind else { return self.unfit(ast, &values) };
+        let Some(kind) = kind else { return self.text.unfit(ast, &values) };
         let same = values[0].to(kind).eq_missing(values[1].to(kind));
         Ok(Value::bool(if wanted { same.not() } else { same }))
     }
 
     fn compared(&self, ast: &Ast, left: &Value, op: &BinaryOperator, right: &Value) -> QueryResult<Expr> {
         let result = compare(left, op, right).map(|value| value.expr);
-        result.map_or_else(|| self.unfit(ast, &[left.clone(), right.clone()]), Ok)
+        result.map_or_else(|| self.text.unfit(ast, &[left.clone(), right.clone()]), Ok)
     }
 
     fn between(&mut self, ast: &Ast, expr: &Ast, negated: bool, ends: [&Ast; 2]) -> QueryResult<Value> {
@@ -373,14 +407,14 @@ impl<'p, 's> Scope<'p, 's> {
 
     fn in_subquery(&mut self, ast: &Ast, expr: &Ast, query: &Query, negated: bool) -> QueryResult<Value> {
         let value = self.value(expr)?;
-        let (items, found) = self.alone(query, Planner::column)?;
+        let (items, found) = self.alone(query, Self::column)?;
         let kind = common([&value, &items]).filter(|_| compare(&value, &BinaryOperator::Eq, &items).is_some());
-        let Some(kind) = kind else { return self.unfit(ast, &[value, items]) };
+        let Some(kind) = kind else { return self.text.unfit(ast, &[value, items]) };
         if found.is_empty() {
             return Ok(Value::bool(lit(negated)));
         }
         let has_null = found.null_count() > 0;
-        let known = found.drop_nulls().strict_cast(&kind.wide()).map_err(super::run::PolarsError::from)?;
+        let known = found.drop_nulls().strict_cast(&kind.wide()).map_err(PolarsError::from)?;
         let inside = value.to(kind).is_in(lit(known).implode(false), false);
         // Beside a null, a value that is not in the list is unknown.
         let inside = if has_null { when(inside).then(lit(true)).otherwise(lit(NULL)) } else { inside };
@@ -390,10 +424,10 @@ impl<'p, 's> Scope<'p, 's> {
     fn like(&mut self, ast: &Ast, expr: &Ast, pattern: &Ast, negated: bool) -> QueryResult<Value> {
         let value = self.value(expr)?;
         let Ast::Value(ValueWithSpan { value: Literal::SingleQuotedString(pattern), .. }) = pattern else {
-            return self.unsupported(ast);
+            return self.text.refuse(ast);
         };
         if value.kind != Kind::Text {
-            return self.unfit(ast, &[value]);
+            return self.text.unfit(ast, &[value]);
         }
         let part = |character: char| match character {
             '%' => ".*".to_owned(),
@@ -428,7 +462,7 @@ impl<'p, 's> Scope<'p, 's> {
             results.push(self.value(&one.result)?);
         }
         results.push(otherwise.map_or_else(|| Ok(Value::null()), |value| self.value(value))?);
-        let Some(kind) = common(&results) else { return self.unfit(ast, &results) };
+        let Some(kind) = common(&results) else { return self.text.unfit(ast, &results) };
         let last = results.last().map_or_else(|| lit(NULL), |value| value.to(kind));
         let chain = conditions.into_iter().zip(&results).rev();
         let expr = chain.fold(last, |rest, (met, value)| {
@@ -446,26 +480,19 @@ impl<'p, 's> Scope<'p, 's> {
             DataType::BigInt(None) | DataType::Int8(None) => "BIGINT",
             DataType::Double(_) | DataType::DoublePrecision | DataType::Float8 => "DOUBLE",
             DataType::Text | DataType::Varchar(None) | DataType::String(None) => "VARCHAR",
-            _ => return self.unfit(ast, &[value]),
+            _ => return self.text.unfit(ast, &[value]),
         };
         let accepted = CASTS.iter().any(|(kind, targets)| *kind == value.kind && targets.contains(&target));
         let small = value.kind == Kind::Int && target == "INTEGER" && value.bits <= 31;
         if !accepted && !small {
-            return self.unfit(ast, &[value]);
+            return self.text.unfit(ast, &[value]);
         }
-        Ok(match (value.kind, target) {
-            (Kind::Bool, "INTEGER" | "BIGINT") => Value::int(value.to(Kind::Int), 1),
-            (_, "INTEGER" | "BIGINT") => Value::int(value.to(Kind::Int), value.bits),
-            (_, "DOUBLE") => Value::new(value.float(), Kind::Float),
-            (_, "BOOLEAN") => value,
+        let bits = if value.kind == Kind::Bool { 1 } else { value.bits };
+        Ok(match target {
+            "INTEGER" | "BIGINT" => Value::int(value.to(Kind::Int), bits),
+            "DOUBLE" => Value::new(value.float(), Kind::Float),
+            "BOOLEAN" => value,
             _ => Value::new(value.to(Kind::Text), Kind::Text),
         })
-    }
-
-    /// A scalar function.
-    pub(super) fn call(&mut self, ast: &Ast, name: &str, args: &[&Ast]) -> QueryResult<Value> {
-        let values = args.iter().map(|arg| self.value(arg)).collect::<Result<Vec<_>, _>>()?;
-        let Some(numbers) = super::windows::fitting(name, args, &values) else { return self.unfit(ast, &values) };
-        scalar(name, &values, &numbers).map_or_else(|| self.unfit(ast, &values), Ok)
     }
 }

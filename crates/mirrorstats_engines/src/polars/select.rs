@@ -1,38 +1,44 @@
 //! One SELECT: WHERE, groups, HAVING, windows, columns, DISTINCT, ORDER BY.
 
-use std::collections::HashSet;
 use std::ops::ControlFlow;
+use std::slice;
 
 use polars::prelude::{Expr, LazyFrame, NULL, UnionArgs, UniqueKeepStrategy, col, concat, len, lit};
 use sqlparser::ast::{
-    Distinct, ExcludeSelectItem, Expr as Ast, GroupByExpr, GroupByWithModifier, ObjectName, OrderByExpr, Query, Select,
-    SelectItem, SelectItemQualifiedWildcardKind, Spanned as _, Visit, Visitor, WildcardAdditionalOptions,
+    Distinct, ExcludeSelectItem, Expr as Ast, GroupByExpr, ObjectName, OrderByExpr, Query, Select, SelectItem,
+    SelectItemQualifiedWildcardKind, Spanned as _, Visit, Visitor, WildcardAdditionalOptions,
 };
 
 use super::accepted::Kind;
-use super::names::column_name;
-use super::plan::{Planner, sort};
+use super::names::{column_name, integer};
+use super::plan::Planner;
 use super::refused::QueryResult;
-use super::relation::{Column, Found, Relation, find};
+use super::relation::{Column, Found, Order, Relation, find, sort};
 use super::run::PolarsError;
 use super::scope::{Key, Scope};
 use super::value::Value;
-use super::windows::{Order, integer, is_aggregate_call};
+use super::windows::is_aggregate_call;
 
+/// Each grouping set is a frame of its own.
 const MOST_SETS: usize = 64;
 
-/// A column of the result.
-struct Item {
+pub(super) struct Item {
     name: String,
     ast: Option<Ast>,
     value: Value,
+}
+
+impl Item {
+    pub(super) fn of(column: &Column) -> Self {
+        Self { name: column.name.clone(), ast: None, value: column.value.clone() }
+    }
 }
 
 impl Planner<'_> {
     pub(super) fn select(&mut self, select: &Select, orders: &[OrderByExpr]) -> QueryResult<Relation> {
         self.only_known_clauses(select)?;
         let from = self.from(&select.from)?;
-        let mut scope = Scope::new(self, from.columns);
+        let mut scope = self.scope(from.columns);
         scope.aliases = select.projection.iter().filter_map(aliased).collect();
         let mut frame = from.frame;
         if let Some(condition) = &select.selection {
@@ -43,9 +49,16 @@ impl Planner<'_> {
         let before = scope.windows.len();
         let having = select.having.as_ref().map(|having| scope.truth(having)).transpose()?;
         if let Some(having) = select.having.as_ref().filter(|_| scope.windows.len() > before) {
-            return scope.unsupported(having);
+            return scope.text.refuse(having);
         }
-        let (distinct, columns) = (select.distinct == Some(Distinct::Distinct), scope.columns_of(&items));
+        let distinct = select.distinct == Some(Distinct::Distinct);
+        let mut results = Vec::new();
+        let columns = items.iter().map(|item| {
+            let expr = scope.names.keep(&mut results, item.value.expr.clone());
+            let value = Value { expr, ..item.value.clone() };
+            Column { table: String::new(), name: item.name.clone(), value, hidden: false }
+        });
+        let columns: Vec<Column> = columns.collect();
         let (extra, keys) = scope.orders(orders, &items, &columns, distinct)?;
         frame = frame.with_columns(&scope.prepared);
         if let Some(sets) = sets {
@@ -56,10 +69,9 @@ impl Planner<'_> {
             frame = sort(frame.with_columns(&window.prepared), &window.order);
             frame = window.steps.iter().fold(frame, LazyFrame::with_columns);
         }
-        let results =
-            items.iter().zip(&columns).map(|(item, column)| item.value.expr.clone().alias(column.inner.as_str()));
-        frame = frame.with_columns(results.chain(extra).collect::<Vec<_>>());
-        let chosen: Vec<Expr> = columns.iter().map(|column| col(column.inner.as_str())).collect();
+        results.extend(extra);
+        frame = frame.with_columns(results);
+        let chosen: Vec<Expr> = columns.iter().map(|column| column.value.expr.clone()).collect();
         if distinct {
             frame = frame.select(&chosen).unique(None, UniqueKeepStrategy::Any);
         }
@@ -78,11 +90,11 @@ impl Planner<'_> {
         };
         let rest = known.to_string();
         if rest.trim() != "SELECT" {
-            return self.unsupported(select.span(), rest.trim().trim_start_matches("SELECT "));
+            return self.text.refuse_at(select.span(), rest.trim().trim_start_matches("SELECT "));
         }
         match &select.distinct {
             None | Some(Distinct::Distinct) => Ok(()),
-            Some(other) => self.unsupported(select.span(), other),
+            Some(other) => self.text.refuse_at(select.span(), other),
         }
     }
 }
@@ -125,81 +137,56 @@ fn has_aggregate(node: &impl Visit) -> bool {
 impl Scope<'_, '_> {
     /// Reads GROUP BY. Returns the grouping sets as positions of keys; `None` if rows are not grouped.
     fn groups(&mut self, select: &Select, orders: &[OrderByExpr]) -> QueryResult<Option<Vec<Vec<usize>>>> {
-        let GroupByExpr::Expressions(parts, modifiers) = &select.group_by else {
-            return Err(super::refused::unsupported(self.source(), select.span(), "GROUP BY ALL"));
+        let parts = match &select.group_by {
+            GroupByExpr::Expressions(parts, modifiers) if modifiers.is_empty() => parts,
+            other => return self.text.refuse_at(select.span(), other),
         };
         let aggregates =
             has_aggregate(&select.projection) || has_aggregate(&orders.to_vec()) || select.having.is_some();
-        if parts.is_empty() && modifiers.is_empty() && !aggregates {
+        if parts.is_empty() && !aggregates {
             return Ok(None);
         }
-        let mut keys: Vec<Ast> = Vec::new();
-        let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
-        for option in self.options(parts, modifiers, select)? {
-            let option: Vec<Vec<usize>> = option.into_iter().map(|set| positions(&mut keys, set)).collect();
-            sets = sets.iter().flat_map(|set| option.iter().map(move |more| [set.as_slice(), more].concat())).collect();
-            if sets.len() > MOST_SETS {
-                let message = format!("expected at most {MOST_SETS} grouping sets, found {}", sets.len());
-                return self.wrong(select.span(), message, None);
+        let asts = match parts.as_slice() {
+            [Ast::Rollup(parts)] if parts.len() < MOST_SETS => {
+                (0..=parts.len()).rev().map(|length| parts[..length].concat()).collect()
             }
-        }
+            [Ast::Cube(parts)] if parts.len() <= 6 => subsets(parts),
+            [Ast::GroupingSets(sets)] if sets.len() <= MOST_SETS => sets.clone(),
+            parts => vec![parts.iter().map(|part| self.plain_key(part, &select.projection)).collect::<Result<_, _>>()?],
+        };
+        let mut keys: Vec<Ast> = Vec::new();
+        let sets: Vec<Vec<usize>> = asts.into_iter().map(|set| positions(&mut keys, set)).collect();
         let is_set = sets.len() > 1;
         let keys = keys.iter().map(|key| self.group_key(key, is_set)).collect::<Result<_, _>>()?;
         self.keys = Some(keys);
         Ok(Some(sets))
     }
 
-    fn options(
-        &self,
-        parts: &[Ast],
-        modifiers: &[GroupByWithModifier],
-        select: &Select,
-    ) -> QueryResult<Vec<Vec<Vec<Ast>>>> {
-        let single = |parts: &[Ast]| parts.iter().map(|part| vec![part.clone()]).collect::<Vec<_>>();
-        match modifiers {
-            [] => {}
-            [GroupByWithModifier::Rollup] => return Ok(vec![prefixes(&single(parts))]),
-            [GroupByWithModifier::Cube] if parts.len() <= 6 => return Ok(vec![subsets(&single(parts))]),
-            _ => {
-                return Err(super::refused::unsupported(
-                    self.source(),
-                    select.span(),
-                    format!("`{}`", select.group_by),
-                ));
-            }
-        }
-        let one = |part: &Ast| match part {
-            Ast::Rollup(parts) => Ok(prefixes(parts)),
-            Ast::Cube(parts) if parts.len() <= 6 => Ok(subsets(parts)),
-            Ast::Cube(parts) => {
-                let message = format!("expected at most {MOST_SETS} grouping sets, found 2^{}", parts.len());
-                self.wrong(part.span(), message, None)
-            }
-            Ast::GroupingSets(sets) => Ok(sets.clone()),
-            Ast::Tuple(_) => self.unsupported(part),
-            part => match integer(part) {
-                None => Ok(vec![vec![part.clone()]]),
-                Some(at) => Ok(vec![vec![self.position(part, at, &select.projection)?]]),
+    /// A key of GROUP BY, which may be the number of a selected column.
+    fn plain_key(&self, part: &Ast, items: &[SelectItem]) -> QueryResult<Ast> {
+        match (part, integer(part)) {
+            (Ast::Rollup(_) | Ast::Cube(_) | Ast::GroupingSets(_) | Ast::Tuple(_), _) => self.text.refuse(part),
+            (_, None) => Ok(part.clone()),
+            (_, Some(at)) => match &items[self.numbered(part, at, items.len())?] {
+                SelectItem::UnnamedExpr(expr) | SelectItem::ExprWithAlias { expr, .. } => Ok(expr.clone()),
+                _ => self.text.refuse(part),
             },
-        };
-        parts.iter().map(one).collect()
+        }
     }
 
-    /// The selected expression with a number, from 1.
-    fn position(&self, part: &Ast, at: i64, items: &[SelectItem]) -> QueryResult<Ast> {
-        let item = usize::try_from(at).ok().and_then(|at| items.get(at.checked_sub(1)?));
-        match item {
-            Some(SelectItem::UnnamedExpr(expr) | SelectItem::ExprWithAlias { expr, .. }) => Ok(expr.clone()),
-            _ => self.wrong(part.span(), format!("no selected column has the number {at}"), None),
-        }
+    /// The position of a selected column by its number, from 1.
+    fn numbered(&self, ast: &Ast, number: i64, count: usize) -> QueryResult<usize> {
+        let position = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
+        position
+            .filter(|position| *position < count)
+            .ok_or_else(|| self.text.fault(ast.span(), format!("no selected column has the number {number}")).into())
     }
 
     fn group_key(&mut self, key: &Ast, is_set: bool) -> QueryResult<Key> {
         let row = self.rows("GROUP BY", |scope| scope.exact(key))?;
         // The nulls of other grouping sets have one type.
         let expr = if is_set { row.to(row.kind) } else { row.expr.clone() };
-        let name = self.planner.fresh();
-        self.prepared.push(expr.alias(name.as_str()));
+        let expr = self.names.keep(&mut self.prepared, expr);
         // A key may be named by its alias or by its expression.
         let meant = match key {
             Ast::Identifier(name) if !matches!(find(&self.columns, None, &name.value), Found::One(_)) => self
@@ -209,27 +196,27 @@ impl Scope<'_, '_> {
                 .map(|(_, ast)| ast.clone()),
             _ => None,
         };
-        let grouped = Value { expr: col(name.as_str()), ..row.clone() };
+        let grouped = Value { expr, ..row.clone() };
         Ok(Key { ast: meant.unwrap_or_else(|| key.clone()), row, grouped })
     }
 
     fn items(&mut self, projection: &[SelectItem]) -> QueryResult<Vec<Item>> {
         let mut items = Vec::new();
         for item in projection {
-            match item {
-                SelectItem::UnnamedExpr(expr) => {
-                    let name = self.name_of(expr);
-                    items.push(Item { name, ast: Some(expr.clone()), value: self.value(expr)? });
+            let (name, expr) = match item {
+                SelectItem::UnnamedExpr(expr) => (self.name_of(expr), expr),
+                SelectItem::ExprWithAlias { expr, alias } => (alias.value.clone(), expr),
+                SelectItem::Wildcard(options) => {
+                    items.extend(self.all(item, None, options)?);
+                    continue;
                 }
-                SelectItem::ExprWithAlias { expr, alias } => {
-                    items.push(Item { name: alias.value.clone(), ast: Some(expr.clone()), value: self.value(expr)? });
-                }
-                SelectItem::Wildcard(options) => items.extend(self.all(item, None, options)?),
                 SelectItem::QualifiedWildcard(SelectItemQualifiedWildcardKind::ObjectName(name), options) => {
                     items.extend(self.all(item, Some(name), options)?);
+                    continue;
                 }
-                _ => return Err(super::refused::unsupported(self.source(), item.span(), format!("`{item}`"))),
-            }
+                _ => return self.text.refuse(item),
+            };
+            items.push(Item { name, ast: Some(expr.clone()), value: self.value(expr)? });
         }
         Ok(items)
     }
@@ -254,12 +241,12 @@ impl Scope<'_, '_> {
     ) -> QueryResult<Vec<Item>> {
         let rest = WildcardAdditionalOptions { opt_exclude: None, ..options.clone() }.to_string();
         if !rest.is_empty() {
-            return Err(super::refused::unsupported(self.source(), item.span(), format!("`{item}`")));
+            return self.text.refuse(item);
         }
+        let fault = |message: String| self.text.fault(item.span(), message);
         if self.keys.is_some() {
-            let message = "the column `*` is used beside an aggregate without GROUP BY";
-            let help = "name the columns in its place, here and in a GROUP BY".to_owned();
-            return self.wrong(item.span(), message, Some(help));
+            let fault = fault("the column `*` is used beside an aggregate without GROUP BY".to_owned());
+            return Err(fault.help("name the columns in its place, here and in a GROUP BY").into());
         }
         let table = table.map(ToString::to_string);
         let of_table = |column: &&Column| match &table {
@@ -267,40 +254,29 @@ impl Scope<'_, '_> {
             None => !column.hidden,
         };
         let columns: Vec<&Column> = self.columns.iter().filter(of_table).collect();
-        let excluded: Vec<String> = match &options.opt_exclude {
-            None => Vec::new(),
-            Some(ExcludeSelectItem::Single(name)) => vec![bare(name)],
-            Some(ExcludeSelectItem::Multiple(names)) => names.iter().map(bare).collect(),
+        let excluded = match &options.opt_exclude {
+            None => &[][..],
+            Some(ExcludeSelectItem::Single(name)) => slice::from_ref(name),
+            Some(ExcludeSelectItem::Multiple(names)) => names,
         };
-        let known = |name: &String| columns.iter().any(|column| column.name.eq_ignore_ascii_case(name));
+        let excluded: Vec<String> = excluded.iter().map(bare).collect();
+        let known = |name: &&String| columns.iter().any(|column| column.name.eq_ignore_ascii_case(name));
         if let Some(unknown) = excluded.iter().find(|name| !known(name)) {
-            return self.wrong(item.span(), format!("unknown column `{unknown}` in EXCLUDE"), None);
+            return Err(fault(format!("unknown column `{unknown}` in EXCLUDE")).into());
         }
         if columns.is_empty() {
-            return self.wrong(item.span(), format!("`{item}` has no columns"), Some("name a table with FROM".into()));
+            return Err(fault(format!("`{item}` has no columns")).help("name a table with FROM").into());
         }
         let is_kept = |column: &&&Column| !excluded.iter().any(|name| column.name.eq_ignore_ascii_case(name));
         let kept = columns.iter().filter(is_kept).map(|column| {
-            self.check_type(item.span(), &column.name, column.kind)?;
-            Ok(Item { name: column.name.clone(), ast: None, value: column.value() })
+            self.check_type(item.span(), &column.name, column.value.kind)?;
+            Ok(Item::of(column))
         });
         kept.collect()
     }
 
-    fn columns_of(&mut self, items: &[Item]) -> Vec<Column> {
-        let one = |item: &Item| Column {
-            table: String::new(),
-            name: item.name.clone(),
-            inner: self.planner.fresh(),
-            kind: item.value.kind,
-            bits: item.value.bits,
-            hidden: false,
-        };
-        items.iter().map(one).collect()
-    }
-
     /// The keys of ORDER BY, and the columns that only they need.
-    fn orders(
+    pub(super) fn orders(
         &mut self,
         orders: &[OrderByExpr],
         items: &[Item],
@@ -309,21 +285,16 @@ impl Scope<'_, '_> {
     ) -> QueryResult<(Vec<Expr>, Vec<Order>)> {
         let (mut extra, mut keys) = (Vec::new(), Vec::new());
         for order in orders {
-            let selected = match self.selected(&order.expr, items)? {
-                Some(at) if items[at].value.is_exact() => Some(columns[at].inner.clone()),
-                Some(at) => return self.unfit(&order.expr, &[items[at].value.clone()]),
-                None if distinct => return self.unsupported(&order.expr),
-                None => None,
+            let column = match self.selected(&order.expr, items)? {
+                Some(at) if items[at].value.is_exact() => columns[at].value.expr.clone(),
+                Some(at) => return self.text.unfit(&order.expr, slice::from_ref(&items[at].value)),
+                None if distinct => return self.text.refuse(&order.expr),
+                None => {
+                    let value = self.exact(&order.expr)?;
+                    self.names.keep(&mut extra, value.expr)
+                }
             };
-            let inner = if let Some(inner) = selected {
-                inner
-            } else {
-                let value = self.exact(&order.expr)?;
-                let name = self.planner.fresh();
-                extra.push(value.expr.alias(name.as_str()));
-                name
-            };
-            keys.push(self.order(order, &col(inner.as_str()))?);
+            keys.push(self.order(order, column)?);
         }
         Ok((extra, keys))
     }
@@ -331,14 +302,10 @@ impl Scope<'_, '_> {
     /// The selected column that ORDER BY means by a number, an alias or an equal expression.
     fn selected(&self, key: &Ast, items: &[Item]) -> QueryResult<Option<usize>> {
         if let Some(at) = integer(key) {
-            let position = usize::try_from(at).ok().and_then(|at| at.checked_sub(1)).filter(|at| *at < items.len());
-            return match position {
-                Some(position) => Ok(Some(position)),
-                None => self.wrong(key.span(), format!("no selected column has the number {at}"), None),
-            };
+            return self.numbered(key, at, items.len()).map(Some);
         }
         if matches!(key, Ast::Value(_)) {
-            return self.unsupported(key);
+            return self.text.refuse(key);
         }
         if let Ast::Identifier(name) = key {
             for same in [str::eq, str::eq_ignore_ascii_case] {
@@ -365,10 +332,6 @@ fn positions(keys: &mut Vec<Ast>, set: Vec<Ast>) -> Vec<usize> {
     set.into_iter().map(&mut position).collect()
 }
 
-fn prefixes(parts: &[Vec<Ast>]) -> Vec<Vec<Ast>> {
-    (0..=parts.len()).rev().map(|length| parts[..length].concat()).collect()
-}
-
 fn subsets(parts: &[Vec<Ast>]) -> Vec<Vec<Ast>> {
     let chosen = |bits: usize| parts.iter().enumerate().filter(move |(at, _)| bits & (1 << at) == 0);
     (0..1_usize << parts.len()).map(|bits| chosen(bits).flat_map(|(_, part)| part.clone()).collect()).collect()
@@ -380,14 +343,9 @@ fn grouped(frame: &LazyFrame, scope: &Scope<'_, '_>, sets: &[Vec<usize>]) -> Que
     // Polars needs an aggregate.
     let aggregates: Vec<Expr> = scope.aggregates.iter().cloned().chain([len().alias("")]).collect();
     let of_set = |set: &Vec<usize>| {
-        let set: HashSet<usize> = set.iter().copied().collect();
-        let by: Vec<Expr> = keys
-            .iter()
-            .enumerate()
-            .filter(|(at, _)| set.contains(at))
-            .map(|(_, key)| key.grouped.expr.clone())
-            .collect();
-        let nulls = keys.iter().enumerate().filter(|(at, _)| !set.contains(at)).map(|(_, key)| null_of(key));
+        let (inside, outside): (Vec<_>, Vec<_>) = keys.iter().enumerate().partition(|(at, _)| set.contains(at));
+        let by: Vec<Expr> = inside.into_iter().map(|(_, key)| key.grouped.expr.clone()).collect();
+        let nulls: Vec<Expr> = outside.into_iter().map(|(_, key)| null_of(key)).collect();
         let groups = if by.is_empty() {
             frame.clone().select(&aggregates)
         } else {
@@ -395,7 +353,7 @@ fn grouped(frame: &LazyFrame, scope: &Scope<'_, '_>, sets: &[Vec<usize>]) -> Que
         };
         let names = keys.iter().map(|key| key.grouped.expr.clone());
         let parts = scope.aggregates.iter().map(|part| col(name_in(part)));
-        groups.with_columns(nulls.collect::<Vec<_>>()).select(names.chain(parts).chain([col("")]).collect::<Vec<_>>())
+        groups.with_columns(nulls).select(names.chain(parts).chain([col("")]).collect::<Vec<_>>())
     };
     let frames: Vec<LazyFrame> = sets.iter().map(of_set).collect();
     Ok(match frames.as_slice() {

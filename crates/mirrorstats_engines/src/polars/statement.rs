@@ -12,9 +12,10 @@ use sqlparser::ast::{
 };
 use sqlparser::tokenizer::Span;
 
-use mirrorstats_exact::suggest::nearest;
-pub use mirrorstats_metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened, with_stack};
-use mirrorstats_toml_spec::{Fault, Faults, Place, Source};
+use super::refused::Text;
+use mirrorstats_exact::suggest::did_you_mean;
+use mirrorstats_metric::syntax::grammar::{Grammar, SyntaxFault, shortened, with_stack};
+use mirrorstats_toml_spec::{Fault, Faults, Source};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Table {
@@ -53,17 +54,17 @@ impl Checked {
 
 const QUERY: Grammar = Grammar { noun: "query", one: "a query", longest: 64 * 1024, most_tokens: 8000, help: None };
 
+const CHANGES_NOTHING: &str = "a query is a SELECT: it reads, and changes nothing";
+
 pub fn check(text: &str) -> Result<Checked, Faults> {
     with_stack(text, || checked(text))
 }
 
 fn checked(text: &str) -> Result<Checked, Faults> {
     let source = Arc::new(Source { name: "query".to_owned(), text: text.to_owned() });
-    let at = |span, message: String| Fault::new(Place { source: Arc::clone(&source), span }, message);
-    let parsed = parse(text);
-    let statement = parsed.map_err(|fault| Faults(vec![at(fault.span, fault.message).help_if(fault.help)]))?;
-    let mut reader = Reader { source: &source, ctes: BTreeSet::new(), tables: BTreeSet::new(), faults: Vec::new() };
-    let _ = statement.visit(&mut Names(&mut reader.ctes));
+    let at = |fault: SyntaxFault| Text(&source).fault_at(fault.span, fault.message).help_if(fault.help);
+    let statement = parse(text).map_err(|fault| Faults(vec![at(fault)]))?;
+    let mut reader = Reader { text: Text(&source), ctes: BTreeSet::new(), tables: BTreeSet::new(), faults: Vec::new() };
     let _ = statement.visit(&mut reader);
     let (tables, faults) = (reader.tables, reader.faults);
     if !faults.is_empty() {
@@ -79,40 +80,24 @@ fn checked(text: &str) -> Result<Checked, Faults> {
 
 fn parse(text: &str) -> Result<Statement, SyntaxFault> {
     let parsed = QUERY.parser(text, |tokens| tokens)?.parse_statements();
-    let mut statements = parsed.map_err(|error| QUERY.fault(text, &error))?;
-    let (message, help) = match (statements.pop(), statements.len()) {
-        (
-            Some(statement @ (Statement::Query(_) | Statement::ShowTables { .. } | Statement::ExplainTable { .. })),
-            0,
-        ) => {
+    let statements = parsed.map_err(|error| QUERY.fault(text, &error))?;
+    let (message, help) = match <[Statement; 1]>::try_from(statements) {
+        Ok([statement @ (Statement::Query(_) | Statement::ShowTables { .. } | Statement::ExplainTable { .. })]) => {
             return Ok(statement);
         }
-        (Some(_), 0) => {
-            let help = "write SELECT ... FROM steps, episodes or cells";
-            ("a query is a SELECT: it reads, and changes nothing".to_owned(), Some(help))
+        Ok(_) => (CHANGES_NOTHING.to_owned(), Some("write SELECT ... FROM steps, episodes or cells")),
+        Err(none) if none.is_empty() => {
+            ("expected a query, found none".to_owned(), Some("write SELECT ... FROM steps"))
         }
-        (Some(_), more) => (format!("expected one statement, found {}", more + 1), None),
-        (None, _) => ("expected a query, found none".to_owned(), Some("write SELECT ... FROM steps")),
+        Err(several) => (format!("expected one statement, found {}", several.len()), None),
     };
     Err(SyntaxFault { message, span: 0..text.len(), help: help.map(str::to_owned) })
 }
 
-/// Collects the names that a query gives to its own tables.
-struct Names<'n>(&'n mut BTreeSet<String>);
-
-impl Visitor for Names<'_> {
-    type Break = ();
-
-    fn pre_visit_query(&mut self, query: &Query) -> ControlFlow<()> {
-        let ctes = query.with.iter().flat_map(|with| &with.cte_tables);
-        self.0.extend(ctes.map(|cte| cte.alias.name.value.clone()));
-        ControlFlow::Continue(())
-    }
-}
-
 /// Walks a statement and refuses anything that reads beyond the tables or changes something.
 struct Reader<'s> {
-    source: &'s Arc<Source>,
+    text: Text<'s>,
+    /// The names that the query gives to its own tables, each known before the tables that it may name.
     ctes: BTreeSet<String>,
     tables: BTreeSet<Table>,
     faults: Vec<Fault>,
@@ -120,9 +105,7 @@ struct Reader<'s> {
 
 impl Reader<'_> {
     fn refuse(&mut self, span: Span, message: impl Into<String>, help: Option<String>) {
-        let fault =
-            Fault::new(Place { source: Arc::clone(self.source), span: bytes_of(&self.source.text, span) }, message);
-        self.faults.push(fault.help_if(help));
+        self.faults.push(self.text.fault(span, message).help_if(help));
     }
 
     /// A name that a query defines must not hide a table.
@@ -134,22 +117,16 @@ impl Reader<'_> {
     }
 
     fn table(&mut self, name: &ObjectName, alias: Option<&TableAlias>) {
-        let parts = &name.0;
-        let word = parts.first().and_then(|part| part.as_ident()).map(|ident| ident.value.clone()).unwrap_or_default();
-        if parts.len() == 1 && self.ctes.contains(&word) {
-            return;
-        }
-        if let Some(table) = Table::named(&word).filter(|_| parts.len() == 1) {
+        let word = if let [part] = name.0.as_slice() { part.as_ident() } else { None };
+        let word = word.map(|ident| ident.value.as_str());
+        if let Some(table) = word.and_then(Table::named) {
             self.tables.insert(table);
-            if let Some(alias) = alias.filter(|alias| alias.name.value != word) {
+            if let Some(alias) = alias.filter(|alias| Some(alias.name.value.as_str()) != word) {
                 self.check_name(&alias.name);
             }
-        } else {
-            let near = nearest(&word, Table::ALL.map(Table::name)).filter(|_| parts.len() == 1);
-            let help = match near {
-                Some(near) => format!("did you mean `{near}`?"),
-                None => "tables are steps, episodes, cells".to_owned(),
-            };
+        } else if !word.is_some_and(|word| self.ctes.contains(word)) {
+            let near = word.and_then(|word| did_you_mean(word, Table::ALL.map(Table::name)));
+            let help = near.unwrap_or_else(|| "tables are steps, episodes, cells".to_owned());
             self.refuse(name.span(), format!("unknown table `{name}`"), Some(help));
         }
     }
@@ -161,6 +138,7 @@ impl Visitor for Reader<'_> {
     fn pre_visit_query(&mut self, query: &Query) -> ControlFlow<()> {
         for cte in query.with.iter().flat_map(|with| &with.cte_tables) {
             self.check_name(&cte.alias.name);
+            self.ctes.insert(cte.alias.name.value.clone());
         }
         if let SetExpr::Table(_) = query.body.as_ref() {
             self.refuse(query.span(), "`TABLE name` is not supported", Some("write SELECT * FROM name".to_owned()));
@@ -179,7 +157,7 @@ impl Visitor for Reader<'_> {
         if let Statement::ExplainTable { table_name, .. } = statement {
             self.table(table_name, None);
         } else if !matches!(statement, Statement::Query(_) | Statement::ShowTables { .. }) {
-            self.refuse(statement.span(), "a query is a SELECT: it reads, and changes nothing", None);
+            self.refuse(statement.span(), CHANGES_NOTHING, None);
         }
         ControlFlow::Continue(())
     }

@@ -149,7 +149,6 @@ impl Value {
         matches!(self.expr, Expr::Literal(_)) && self.kind == Kind::Int && self.bits > 0
     }
 
-    /// The number of a literal.
     pub(super) fn number(&self) -> Option<f64> {
         let Expr::Literal(literal) = &self.expr else { return None };
         literal.to_any_value()?.extract()

@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::Number;
 
 use super::cause::Failed;
-use super::{Job, SparkError, cause, check, request, source};
+use super::{Job, SparkError, Written, cause, request, source};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::input;
+use mirrorstats_exact::number::Decimal;
+use mirrorstats_metric::logical_plan::plan::Output;
 use mirrorstats_score::tables::builder::TableBuilder;
 use mirrorstats_score::tables::table::{EpisodeKey, EpisodeTable, Header};
 use mirrorstats_trace::diagnostic::{Code, Finding};
@@ -17,15 +19,10 @@ use mirrorstats_trace::schema::colors;
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Answer {
-    Done(Done),
+    Done(Written),
     Refused(Refused),
     Failed(Failed),
     Late {},
-}
-
-#[derive(Debug, Deserialize)]
-pub(super) struct Done {
-    pub(super) episodes: u64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -40,7 +37,7 @@ pub(super) enum Refused {
 #[derive(Debug, Deserialize)]
 pub(super) struct Fault {
     episode: Option<String>,
-    /// The index in [`check::rules`].
+    /// The index in [`request::rules`].
     rule: usize,
     found: String,
 }
@@ -69,16 +66,13 @@ impl Refused {
 }
 
 fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {
-    let columns = request::columns(&job.definitions.plan, job.labels);
-    let palette = job.sources.palette();
-    let mut rules = check::rules(columns.iter().map(|(name, _)| name.as_str()), &job.definitions.catalog, palette);
-    let rule = (fault.rule < rules.len()).then(|| rules.swap_remove(fault.rule))?;
+    let rule = request::rules(job).into_iter().nth(fault.rule)?;
     let mut finding = Finding::new(rule.code, job.sources.name(), rule.expected, fault.found).in_column(&rule.column);
     if let Some(color) = colors::column(&rule.column).filter(|_| rule.code == Code::InvalidColor) {
         let quoted = finding.found.strip_prefix('`').and_then(|found| found.strip_suffix('`'));
         let text = quoted.unwrap_or(&finding.found).to_owned();
         finding.found = format!("`{}`", text.escape_debug());
-        finding.help = color.help(&text, palette);
+        finding.help = color.help(&text, job.sources.palette.as_ref());
     }
     Some(match fault.episode {
         Some(episode) => finding.in_episode(episode),
@@ -100,54 +94,38 @@ pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkErro
     let mut builder = TableBuilder::new(header);
     for line in input::lines(path, LONGEST_LINE).map_err(|error| fault(error.to_string()))? {
         let line = line.map_err(|error| fault(error.to_string()))?;
-        let row: Vec<Value> = serde_json::from_slice(&line).map_err(|error| fault(error.to_string()))?;
-        append(&mut builder, row)
-            .ok_or_else(|| fault(format!("an invalid episode: {}", String::from_utf8_lossy(&line).trim_end())))?;
+        let row: Row = serde_json::from_slice(&line).map_err(|error| fault(error.to_string()))?;
+        let Row(episode_id, model, experiment, seed, run, metrics, labels) = row;
+        if (metrics.len(), labels.len()) != (outputs.len(), job.labels.len()) {
+            return Err(fault(format!("an invalid episode: {}", String::from_utf8_lossy(&line).trim_end())));
+        }
+        let key = EpisodeKey { experiment, model, seed, run, episode_id };
+        let stored = |(value, output): (&Option<Number>, &Output)| {
+            value
+                .as_ref()
+                .map(|value| {
+                    let exact: Option<Decimal> = value.to_string().parse().ok();
+                    let units = exact.and_then(|exact| exact.with_places(output.decimals.into()));
+                    units
+                        .and_then(|exact| i64::try_from(exact.units()).ok())
+                        .ok_or_else(|| fault(format!("`{}` is {value}", output.name)))
+                })
+                .transpose()
+        };
+        let metrics = metrics.iter().zip(outputs).map(stored).collect::<Result<Vec<_>, _>>()?;
+        builder.push(key.as_ref(), labels.iter().map(Option::as_deref), metrics);
     }
     Ok(builder.finish())
 }
 
-fn append(table: &mut TableBuilder, row: Vec<Value>) -> Option<()> {
-    let mut cells = row.into_iter();
-    let [episode_id, model, experiment] = [text(cells.next()?)?, text(cells.next()?)?, text(cells.next()?)?];
-    let mut number = || i32::try_from(cells.next()?.as_i64()?).ok();
-    let (seed, run) = (number()?, number()?);
-    let key = EpisodeKey { experiment: experiment?, model: model?, seed, run, episode_id: episode_id? };
-    let (metrics, labels) = (table.header().metrics.len(), table.header().labels.len());
-    let metrics: Vec<Option<i64>> = cells.by_ref().take(metrics).map(integer).collect::<Option<_>>()?;
-    let labels: Vec<Option<String>> = cells.by_ref().take(labels).map(text).collect::<Option<_>>()?;
-    let complete = metrics.len() == table.header().metrics.len() && labels.len() == table.header().labels.len();
-    if !complete || cells.next().is_some() {
-        return None;
-    }
-    table.push(key.as_ref(), labels.iter().map(Option::as_deref), metrics);
-    Some(())
-}
-
-/// An integer or null; `None` for any other value.
-#[expect(clippy::option_option, reason = "null is an undefined metric, and not the same as a value that is no integer")]
-fn integer(value: Value) -> Option<Option<i64>> {
-    match value {
-        Value::Null => Some(None),
-        value => Some(Some(value.as_i64()?)),
-    }
-}
-
-/// A text or null; `None` for any other value.
-#[expect(clippy::option_option, reason = "null is a text's value here, and not the same as a value that is no text")]
-fn text(value: Value) -> Option<Option<String>> {
-    match value {
-        Value::Null => Some(None),
-        Value::String(text) => Some(Some(text)),
-        _ => None,
-    }
-}
+#[derive(Deserialize)]
+struct Row(String, String, String, i32, i32, Vec<Option<Number>>, Vec<Option<String>>);
 
 #[cfg(test)]
 mod tests {
-    use super::{Fault, check, finding, request};
-    use crate::spark::Job;
+    use super::{Fault, finding, request};
     use crate::spark::source::Sources;
+    use crate::spark::{Job, check};
     use mirrorstats_metric::definitions::Definitions;
     use mirrorstats_score::vocabulary::schema_columns;
     use mirrorstats_trace::diagnostic::Code;
@@ -156,7 +134,7 @@ mod tests {
     #[test]
     fn a_color_is_refused_in_the_words_of_the_native_engine() {
         let definitions = Definitions::load("paper", &schema_columns()).unwrap();
-        let sources = Sources::Uris(vec!["s3a://b/x".to_owned()]);
+        let sources = Sources::uris(vec!["s3a://b/x".to_owned()]);
         let job = Job { definitions: &definitions, labels: &[], sources: &sources };
         let columns = request::columns(&definitions.plan, &[]);
         let rules = check::rules(columns.iter().map(|(name, _)| name.as_str()), &definitions.catalog, None);
@@ -177,11 +155,11 @@ mod tests {
     fn a_color_outside_of_the_palette_is_refused_with_the_nearest_one() {
         let definitions = Definitions::load("paper", &schema_columns()).unwrap();
         let palette = Palette::of_names(["teal", "magenta"]).ok();
-        let sources = Sources::Files { names: vec!["a.parquet".to_owned()], groups: Vec::new(), rows: 1, palette };
+        let sources = Sources { names: vec!["a.parquet".to_owned()], groups: Vec::new(), rows: Some(1), palette };
         let job = Job { definitions: &definitions, labels: &[], sources: &sources };
         let columns = request::columns(&definitions.plan, &[]);
         let names = columns.iter().map(|(name, _)| name.as_str());
-        let rules = check::rules(names, &definitions.catalog, sources.palette());
+        let rules = check::rules(names, &definitions.catalog, sources.palette.as_ref());
         let is_wanted = |rule: &check::Rule| rule.code == Code::InvalidColor && rule.column == "body_color";
         let rule = rules.iter().position(is_wanted).unwrap();
         let fault = Fault { episode: Some("e".to_owned()), rule, found: "`magneta`".to_owned() };

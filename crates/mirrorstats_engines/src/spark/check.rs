@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use mirrorstats_metric::catalogs::catalog::Catalog;
 use mirrorstats_metric::sql::Dialect;
 use mirrorstats_trace::diagnostic::Code;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 use mirrorstats_trace::schema::colors::ColorColumn;
 use mirrorstats_trace::schema::colors::palette::Palette;
 use mirrorstats_trace::schema::colors::spelling::{MIXED, STRAY, WORDS};
@@ -56,20 +56,21 @@ fn found(column: &Column, asks: Requirement<'_>) -> String {
     match asks {
         Requirement::Present => format!("CASE WHEN COUNT({x}) < COUNT(*) THEN 'null' END"),
         Requirement::Name => first_bad(&format!("{x} = ''")),
-        Requirement::OneOf(values) => first_bad(&format!("{x} NOT IN ({})", texts(values.iter().copied()))),
-        Requirement::Among(values) => first_bad(&format!("{x} NOT IN ({})", texts(values.iter().map(String::as_str)))),
+        Requirement::OneOf(values) => first_bad(&format!("{x} NOT IN ({})", texts(values))),
+        Requirement::Among(values) => first_bad(&format!("{x} NOT IN ({})", texts(values))),
         Requirement::Color(color, palette) => first_bad(&no_color(&x, color, palette)),
         Requirement::Within(min, max, _) => first_bad(&format!("{x} < {min} OR {x} > {max}")),
         Requirement::Count if column.stored.kind() == Kind::Float => first_bad(&format!("{x} < 0 OR ISNAN({x})")),
         Requirement::Count => first_bad(&format!("{x} < 0")),
         Requirement::Experiment([]) => first_bad("TRUE"),
-        Requirement::Experiment(known) => {
-            first_bad(&format!("{x} NOT IN ({})", texts(known.iter().map(String::as_str))))
-        }
+        Requirement::Experiment(known) => first_bad(&format!("{x} NOT IN ({})", texts(known))),
         Requirement::Constant => {
-            let nulls =
-                if column.nullable { format!(" OR COUNT({x}) BETWEEN 1 AND COUNT(*) - 1") } else { String::new() };
-            format!("CASE WHEN MIN({x}) <> MAX({x}){nulls} THEN {} END", extent(&x, column.nullable))
+            let if_nullable = |text: String| if column.nullable { text } else { String::new() };
+            let has_nulls = if_nullable(format!(" OR COUNT({x}) BETWEEN 1 AND COUNT(*) - 1"));
+            let nulls = if_nullable(format!(", CASE WHEN COUNT({x}) < COUNT(*) THEN ' and null' ELSE '' END"));
+            let extent =
+                format!("CONCAT('`', CAST(MIN({x}) AS STRING), '` to `', CAST(MAX({x}) AS STRING), '`'{nulls})");
+            format!("CASE WHEN MIN({x}) <> MAX({x}){has_nulls} THEN {extent} END")
         }
         Requirement::FromOne => format!("CASE WHEN MIN({x}) <> 1 THEN CONCAT('t = ', MIN({x})) END"),
         Requirement::Once => format!(
@@ -94,33 +95,26 @@ fn no_color(x: &str, column: ColorColumn, palette: Option<&Palette>) -> String {
     )
 }
 
-fn extent(x: &str, nullable: bool) -> String {
-    let nulls = if nullable {
-        format!(", CASE WHEN COUNT({x}) < COUNT(*) THEN ' and null' ELSE '' END")
-    } else {
-        String::new()
-    };
-    format!("CONCAT('`', CAST(MIN({x}) AS STRING), '` to `', CAST(MAX({x}) AS STRING), '`'{nulls})")
-}
-
-fn texts<'a>(values: impl IntoIterator<Item = &'a str>) -> String {
-    values.into_iter().map(|value| Dialect::Spark.text(value)).collect::<Vec<_>>().join(", ")
+fn texts(values: impl IntoIterator<Item: AsRef<str>>) -> String {
+    values.into_iter().map(|value| Dialect::Spark.text(value.as_ref())).collect::<Vec<_>>().join(", ")
 }
 
 /// The statement. Its one row has `steps`, `episodes`, `faults` (episodes that break a rule), and `fault`, the first by
 /// id: its `episode`, the index of its `rule`, and the value `found`.
 pub(super) fn statement(rules: &[Rule]) -> String {
-    let mut text = "WITH episodes AS (\n  SELECT s.episode_id AS episode_id,\n    COUNT(*) AS steps".to_owned();
+    let (mut found, mut first) = (String::new(), String::new());
     for (at, rule) in rules.iter().enumerate() {
-        let _ = write!(text, ",\n    {} AS r{at}", rule.found);
-    }
-    text.push_str("\n  FROM steps s\n  GROUP BY s.episode_id\n),\nfaults AS (\n  SELECT steps,\n    CASE");
-    for at in 0..rules.len() {
+        let _ = write!(found, ",\n    {} AS r{at}", rule.found);
         let fault = format!("NAMED_STRUCT('episode', episode_id, 'rule', {at}, 'found', r{at})");
-        let _ = write!(text, "\n      WHEN r{at} IS NOT NULL THEN {fault}");
+        let _ = write!(first, "\n      WHEN r{at} IS NOT NULL THEN {fault}");
     }
-    text.push_str("\n    END AS fault\n  FROM episodes\n)\n");
-    text + "SELECT COALESCE(SUM(steps), 0) AS steps, COUNT(*) AS episodes, COUNT(fault) AS faults, MIN(fault) AS fault\nFROM faults\n"
+    format!(
+        "WITH episodes AS (\n  SELECT s.episode_id AS episode_id,\n    COUNT(*) AS steps{found}\n  \
+         FROM steps s\n  GROUP BY s.episode_id\n),\n\
+         faults AS (\n  SELECT steps,\n    CASE{first}\n    END AS fault\n  FROM episodes\n)\n\
+         SELECT COALESCE(SUM(steps), 0) AS steps, COUNT(*) AS episodes, COUNT(fault) AS faults, MIN(fault) AS fault\n\
+         FROM faults\n"
+    )
 }
 
 #[cfg(all(test, feature = "polars"))]

@@ -21,16 +21,20 @@ pub mod source;
 mod submit;
 
 use std::fs;
+use std::io;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
+
+use mirrorstats_exact::replace::TemporaryFolder;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_metric::sql::LoweringError;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::diagnostic::Finding;
 
-use self::answer::{Answer, Done};
-use self::request::{Place, Request, TABLE};
+use self::answer::Answer;
+use self::request::{Request, TABLE};
 use self::setting::Setting;
 use self::source::Sources;
 
@@ -52,7 +56,7 @@ pub struct Job<'a> {
     pub sources: &'a Sources,
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 pub struct Written {
     pub episodes: u64,
 }
@@ -71,7 +75,7 @@ pub enum SparkError {
     #[error("cannot connect to the master `{master}`: {words}; is it running, and is this the URL on its web page?")]
     Master { master: String, words: String },
     #[error("cannot {what}")]
-    System { what: String, source: std::io::Error },
+    System { what: String, source: io::Error },
     #[error(transparent)]
     Lowering(#[from] LoweringError),
     #[error(
@@ -104,6 +108,13 @@ pub enum SparkError {
     Answer { words: String },
 }
 
+impl SparkError {
+    fn system(what: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
+        let what = what.into();
+        move |source| Self::System { what, source }
+    }
+}
+
 fn more_episodes(more: u64) -> String {
     match more {
         0 => String::new(),
@@ -113,10 +124,9 @@ fn more_episodes(more: u64) -> String {
 }
 
 pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError> {
-    let place = Place::new()?;
-    let request = Request::new(job, cluster, &place, None)?;
-    finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
-    answer::table(&place.path(TABLE), job)
+    let place = temporary_folder()?;
+    run(job, cluster, place.path(), None)?;
+    answer::table(&place.path().join(TABLE), job)
 }
 
 /// Scores on Spark, which writes the table as a folder of Parquet with the definitions in every file.
@@ -127,18 +137,20 @@ pub fn write(job: Job<'_>, cluster: &Cluster, folder: &str) -> Result<Written, S
         if fs::symlink_metadata(folder).is_ok() {
             return Err(SparkError::Exists { folder: folder.to_owned() });
         }
-        source::local_uri(Path::new(folder))
-            .map_err(|source| SparkError::System { what: format!("resolve `{folder}`"), source })?
+        source::local_uri(Path::new(folder)).map_err(SparkError::system(format!("resolve `{folder}`")))?
     };
-    let place = Place::new()?;
-    let request = Request::new(job, cluster, &place, Some(target))?;
-    let done = finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
-    Ok(Written { episodes: done.episodes })
+    run(job, cluster, temporary_folder()?.path(), Some(target))
 }
 
-fn finished(answer: Answer, job: Job<'_>, cluster: &Cluster) -> Result<Done, SparkError> {
-    match answer {
-        Answer::Done(done) => Ok(done),
+/// The private folder of one submission: its request, which may hold secrets, and the driver's answer.
+fn temporary_folder() -> Result<TemporaryFolder, SparkError> {
+    TemporaryFolder::private("spark").map_err(SparkError::system("make a temporary folder"))
+}
+
+fn run(job: Job<'_>, cluster: &Cluster, place: &Path, folder: Option<String>) -> Result<Written, SparkError> {
+    let request = Request::new(job, cluster, place, folder)?;
+    match submit::submit(&request, cluster, place)? {
+        Answer::Done(written) => Ok(written),
         Answer::Refused(refused) => Err(refused.error(job)),
         Answer::Failed(failed) => Err(cause::of_failure(&failed, cluster)),
         Answer::Late {} => Err(SparkError::Late { seconds: cluster.timeout_s.map_or(0, NonZeroU32::get) }),

@@ -1,14 +1,14 @@
 //! The driver's request: all of its input in one JSON file, in a private folder.
 
-use std::fs;
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use serde_json::{Map, Value};
 
-use super::source::{Group, Sources};
-use super::{Cluster, Job, SparkError, check};
-use mirrorstats_exact::replace::TemporaryFolder;
+use super::check::{self, Rule};
+use super::source::Group;
+use super::{Cluster, Job, SparkError};
 use mirrorstats_metric::columns::Type;
 use mirrorstats_metric::logical_plan::plan::{Op, Plan};
 use mirrorstats_metric::sql::{Dialect, lower};
@@ -21,35 +21,13 @@ const KEYS: [(&str, &str); 5] =
 pub(super) const TABLE: &str = "table.jsonl";
 pub(super) const ANSWER: &str = "answer.json";
 
-/// The private folder of one submission: its request and the driver's answer.
-pub(super) struct Place(TemporaryFolder);
-
-impl Place {
-    pub(super) fn new() -> Result<Self, SparkError> {
-        // The request may hold secrets.
-        let made = TemporaryFolder::private("spark");
-        made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
-    }
-
-    pub(super) fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    pub(super) fn file(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, SparkError> {
-        let path = self.path(name);
-        fs::write(&path, bytes)
-            .map_err(|source| SparkError::System { what: "write a temporary file".into(), source })?;
-        Ok(path)
-    }
-}
-
 #[derive(Debug, Serialize)]
-pub(super) struct Request {
+pub(super) struct Request<'a> {
     parent: u32,
-    timeout: Option<u32>,
+    timeout: Option<NonZeroU32>,
     /// Settings that must not appear on a command line.
-    settings: Map<String, Value>,
-    sources: Vec<Group>,
+    settings: BTreeMap<&'a str, &'a str>,
+    sources: &'a [Group],
     inspect: bool,
     columns: Vec<(String, &'static str)>,
     optional: Vec<String>,
@@ -57,54 +35,56 @@ pub(super) struct Request {
     check: String,
     statement: String,
     results: Vec<(String, &'static str)>,
-    metadata: Map<String, Value>,
+    metadata: BTreeMap<&'static str, String>,
     folder: Option<String>,
-    table: String,
-    answer: String,
+    table: PathBuf,
+    answer: PathBuf,
 }
 
-impl Request {
+impl<'a> Request<'a> {
     pub(super) fn new(
-        job: Job<'_>,
-        cluster: &Cluster,
-        place: &Place,
+        job: Job<'a>,
+        cluster: &'a Cluster,
+        place: &Path,
         folder: Option<String>,
     ) -> Result<Self, SparkError> {
         let columns = columns(&job.definitions.plan, job.labels);
-        let names = columns.iter().map(|(name, _)| name.as_str());
-        let rules = check::rules(names, &job.definitions.catalog, job.sources.palette());
         let secrets = cluster.settings.iter().filter(|setting| setting.is_secret());
-        let rows = match job.sources {
-            Sources::Files { rows, .. } => Some(*rows),
-            Sources::Uris(_) => None,
-        };
         Ok(Self {
             parent: std::process::id(),
-            timeout: cluster.timeout_s.map(std::num::NonZeroU32::get),
-            settings: secrets.map(|setting| (setting.key().to_owned(), setting.value().into())).collect(),
-            sources: job.sources.groups(),
-            inspect: rows.is_none(),
-            rows,
-            check: check::statement(&rules),
+            timeout: cluster.timeout_s,
+            settings: secrets.map(|setting| (setting.key(), setting.value())).collect(),
+            sources: &job.sources.groups,
+            inspect: job.sources.rows.is_none(),
+            rows: job.sources.rows,
+            check: check::statement(&rules(job)),
             statement: statement(job)?,
             results: results(job),
             metadata: metadata(job)?,
             folder,
-            table: place.path(TABLE).display().to_string(),
-            answer: place.path(ANSWER).display().to_string(),
+            table: place.join(TABLE),
+            answer: place.join(ANSWER),
             optional: optional(&columns, job),
             columns,
         })
     }
 }
 
+/// The rules of the columns that are read; the driver names a broken one by its index.
+pub(super) fn rules(job: Job<'_>) -> Vec<Rule> {
+    let columns = columns(&job.definitions.plan, job.labels);
+    let names = columns.iter().map(|(name, _)| name.as_str());
+    check::rules(names, &job.definitions.catalog, job.sources.palette.as_ref())
+}
+
 /// Columns that some files may lack. The footer says whether a required column may be absent; it is read here for local
 /// files only.
 fn optional(columns: &[(String, &'static str)], job: Job<'_>) -> Vec<String> {
-    let knows_footers = matches!(job.sources, Sources::Files { .. });
     let domain = check::domain_of(&job.definitions.catalog);
     let is_optional = |name: &str| {
-        domain.column(name).is_some_and(|column| column.default.is_some() && (knows_footers || !column.required))
+        domain
+            .column(name)
+            .is_some_and(|column| column.default.is_some() && (job.sources.rows.is_some() || !column.required))
     };
     columns.iter().map(|(name, _)| name).filter(|name| is_optional(name)).cloned().collect()
 }
@@ -124,8 +104,8 @@ pub(super) fn columns(plan: &Plan, labels: &[String]) -> Vec<(String, &'static s
         }
     }
     for label in labels {
-        let stored = mirrorstats_trace::schema::column(label).map(|column| column.stored.kind());
-        add(label, if stored == Some(mirrorstats_trace::schema::Kind::Int) { "int" } else { "string" });
+        let stored = schema::column(label).map(|column| column.stored.kind());
+        add(label, if stored == Some(schema::Kind::Int) { "int" } else { "string" });
     }
     columns
 }
@@ -166,17 +146,20 @@ fn statement(job: Job<'_>) -> Result<String, SparkError> {
 /// Keys, metrics, labels: the order of [`statement`].
 fn results(job: Job<'_>) -> Vec<(String, &'static str)> {
     let keys = KEYS.map(|(name, kind)| (name.to_owned(), kind));
-    let metrics = job.definitions.plan.outputs.iter().map(|output| (output.name.clone(), "bigint"));
+    let metrics = job.definitions.plan.outputs.iter().map(|output| {
+        let ty = if output.decimals > 0 { "double" } else { "bigint" };
+        (output.name.clone(), ty)
+    });
     let labels = job.labels.iter().map(|label| (label.clone(), "string"));
     keys.into_iter().chain(metrics).chain(labels).collect()
 }
 
-fn metadata(job: Job<'_>) -> Result<Map<String, Value>, SparkError> {
+fn metadata(job: Job<'_>) -> Result<BTreeMap<&'static str, String>, SparkError> {
     let catalog = &job.definitions.catalog;
     let definitions =
         serde_json::to_string(catalog).map_err(|error| SparkError::Answer { words: error.to_string() })?;
     let pairs = [(KIND_KEY, SCORES_KIND.to_owned()), (HASH_KEY, catalog.hash.clone()), (DEFINITIONS_KEY, definitions)];
-    Ok(pairs.into_iter().map(|(key, value)| (key.to_owned(), Value::String(value))).collect())
+    Ok(pairs.into())
 }
 
 #[cfg(test)]
@@ -223,7 +206,7 @@ mod tests {
         for definitions in definitions {
             let definitions = definitions.unwrap();
             let labels = ["body_color".to_owned(), "distractors".to_owned()];
-            let sources = Sources::Uris(Vec::new());
+            let sources = Sources::uris(Vec::new());
             let job = Job { definitions: &definitions, labels: &labels, sources: &sources };
             let read = columns(&definitions.plan, &labels);
             let rules = check::rules(read.iter().map(|(name, _)| name.as_str()), &definitions.catalog, None);

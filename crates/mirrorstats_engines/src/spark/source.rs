@@ -11,9 +11,13 @@ use mirrorstats_trace::read::open::{TraceFile, TraceSet};
 use mirrorstats_trace::schema::colors::palette::Palette;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Sources {
-    Files { names: Vec<String>, groups: Vec<Group>, rows: u64, palette: Option<Palette> },
-    Uris(Vec<String>),
+pub struct Sources {
+    /// Without users and passwords.
+    pub(super) names: Vec<String>,
+    pub(super) groups: Vec<Group>,
+    /// The rows by the footers of local files.
+    pub(super) rows: Option<u64>,
+    pub(super) palette: Option<Palette>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -32,34 +36,21 @@ impl Sources {
             let void = file.columns().iter().filter(|column| column.kind.is_none()).map(|column| column.name.clone());
             groups.entry(void.collect()).or_default().push(literal(&local_uri(&input.path)?));
         }
-        Ok(Self::Files {
+        Ok(Self {
             names: inputs.iter().map(|input| input.name.clone()).collect(),
             groups: groups.into_iter().map(|(void, paths)| Group { paths, void }).collect(),
-            rows: traces.files().iter().map(TraceFile::rows).sum(),
+            rows: Some(traces.files().iter().map(TraceFile::rows).sum()),
             palette: Palette::of_all(traces.files().iter().map(TraceFile::palette)),
         })
     }
 
-    pub(super) fn palette(&self) -> Option<&Palette> {
-        match self {
-            Self::Files { palette, .. } => palette.as_ref(),
-            Self::Uris(_) => None,
-        }
-    }
-
-    pub(super) fn groups(&self) -> Vec<Group> {
-        match self {
-            Self::Files { groups, .. } => groups.clone(),
-            Self::Uris(uris) => vec![Group { paths: uris.clone(), void: Vec::new() }],
-        }
+    pub fn uris(uris: Vec<String>) -> Self {
+        let names = uris.iter().map(|uri| without_user(uri)).collect();
+        Self { names, groups: vec![Group { paths: uris, void: Vec::new() }], rows: None, palette: None }
     }
 
     pub(super) fn name(&self) -> String {
-        let names = match self {
-            Self::Files { names, .. } => names.clone(),
-            Self::Uris(uris) => uris.iter().map(|uri| without_user(uri)).collect(),
-        };
-        match names.as_slice() {
+        match self.names.as_slice() {
             [one] => one.clone(),
             [first, others @ ..] => format!("{first} and {} more", others.len()),
             [] => "no trace".to_owned(),

@@ -6,12 +6,13 @@
 use std::fs::{self, File};
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs as _};
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use super::answer::Answer;
 use super::locate::{Spark, locate};
-use super::request::{ANSWER, Place, Request};
+use super::request::{ANSWER, Request};
 use super::{Cluster, SparkError, cause};
 
 const DRIVER: &str = include_str!("../../../../assets/spark/driver.py");
@@ -35,22 +36,23 @@ impl Drop for Running {
     }
 }
 
-pub(super) fn submit(request: &Request, cluster: &Cluster, place: &Place) -> Result<Answer, SparkError> {
+pub(super) fn submit(request: &Request<'_>, cluster: &Cluster, place: &Path) -> Result<Answer, SparkError> {
     let spark = locate()?;
     reach(cluster)?;
     let request = serde_json::to_vec(request).map_err(|error| SparkError::Answer { words: error.to_string() })?;
-    let log = cluster.log.clone().unwrap_or_else(|| place.path("log"));
-    let open = |what: &str| {
-        let file = File::create(&log).and_then(|file| Ok((file.try_clone()?, file)));
-        file.map_err(|source| SparkError::System { what: format!("write {what}"), source })
-    };
-    let (out, err) = open("Spark's log (--spark-log)")?;
+    let log = cluster.log.clone().unwrap_or_else(|| place.join("log"));
+    let opened = File::create(&log).and_then(|file| Ok((file.try_clone()?, file)));
+    let (out, err) = opened.map_err(SparkError::system("write Spark's log (--spark-log)"))?;
     let mut command = command(&spark, cluster);
-    command.arg(place.file("driver.py", DRIVER.as_bytes())?).arg(place.file("request.json", &request)?);
+    for (name, bytes) in [("driver.py", DRIVER.as_bytes()), ("request.json", &request)] {
+        fs::write(place.join(name), bytes).map_err(SparkError::system("write a temporary file"))?;
+        command.arg(place.join(name));
+    }
     let child = command.stdin(Stdio::null()).stdout(out).stderr(err).spawn();
-    let started = |source| SparkError::System { what: format!("start `{}`", spark.program.display()), source };
-    Running(child.map_err(started)?).wait().map_err(started)?;
-    match fs::read(place.path(ANSWER)) {
+    child
+        .and_then(|child| Running(child).wait())
+        .map_err(SparkError::system(format!("start `{}`", spark.program.display())))?;
+    match fs::read(place.join(ANSWER)) {
         Ok(answer) => serde_json::from_slice(&answer).map_err(|error| SparkError::Answer { words: error.to_string() }),
         Err(_) => Err(cause::of_log(&fs::read(&log).unwrap_or_default(), cluster)),
     }
@@ -75,24 +77,20 @@ fn command(spark: &Spark, cluster: &Cluster) -> Command {
 fn reach(cluster: &Cluster) -> Result<(), SparkError> {
     let Some(master) = &cluster.master else { return Ok(()) };
     let Some(addresses) = master.strip_prefix("spark://") else { return Ok(()) };
-    let mut last = None;
-    for address in addresses.split(',') {
-        match connect(address) {
-            Ok(()) => return Ok(()),
-            Err(error) => last = Some(error),
-        }
-    }
-    let words = last.map_or_else(|| "no address".to_owned(), |error| error.to_string());
-    Err(SparkError::Master { master: master.clone(), words })
+    let connect = |address: &str| {
+        first_ok(address.to_socket_addrs()?.map(|address| TcpStream::connect_timeout(&address, PATIENCE)))
+    };
+    let failed = |error: io::Error| SparkError::Master { master: master.clone(), words: error.to_string() };
+    first_ok(addresses.split(',').map(connect)).map(drop).map_err(failed)
 }
 
-fn connect(address: &str) -> io::Result<()> {
-    let mut last = io::Error::new(io::ErrorKind::InvalidInput, "expected spark://HOST:PORT");
-    for address in address.to_socket_addrs()? {
-        match TcpStream::connect_timeout(&address, PATIENCE) {
-            Ok(_) => return Ok(()),
-            Err(error) => last = error,
+fn first_ok<T>(attempts: impl Iterator<Item = io::Result<T>>) -> io::Result<T> {
+    let mut last = Err(io::Error::new(io::ErrorKind::InvalidInput, "expected spark://HOST:PORT"));
+    for attempt in attempts {
+        last = attempt;
+        if last.is_ok() {
+            break;
         }
     }
-    Err(last)
+    last
 }

@@ -48,21 +48,20 @@ impl NewFile {
 
     /// Replaces the target. Afterwards not even a loss of power restores the old content.
     pub fn commit(self) -> io::Result<()> {
-        if self.is_stream {
-            return self.copy_into_target();
-        }
-        self.as_file().sync_all()?;
-        self.file.rename(&self.target)?;
-        sync_folder(folder_of(&self.target))
+        self.commit_by(TemporaryFile::rename)
     }
 
     /// Like [`commit`](Self::commit), but leaves the target unchanged if it exists by now.
     pub fn commit_new(self) -> io::Result<()> {
+        self.commit_by(TemporaryFile::rename_new)
+    }
+
+    fn commit_by(self, rename: fn(TemporaryFile, &Path) -> io::Result<()>) -> io::Result<()> {
         if self.is_stream {
             return self.copy_into_target();
         }
         self.as_file().sync_all()?;
-        self.file.rename_new(&self.target)?;
+        rename(self.file, &self.target)?;
         sync_folder(folder_of(&self.target))
     }
 

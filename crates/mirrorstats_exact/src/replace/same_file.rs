@@ -1,6 +1,9 @@
 //! Checks that an output does not replace an input.
 
-use std::fs;
+use std::fs::{self, Metadata};
+use std::io;
+#[cfg(unix)]
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 use super::place::is_stream;
@@ -53,15 +56,16 @@ pub fn check_folder<P: AsRef<Path>>(
 }
 
 /// Returns true if two paths lead to the same existing file: links are followed, and hard links are one file.
-#[cfg(unix)]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    let place = |path: &Path| fs::metadata(path).map(|metadata| (metadata.dev(), metadata.ino()));
-    matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
+    let is_one_path = || matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b);
+    if cfg!(unix) { is_one_file(fs::metadata(a), fs::metadata(b)) } else { is_one_path() }
 }
 
-/// Returns true if two paths lead to the same existing file: links are followed.
-#[cfg(not(unix))]
-pub fn is_same_file(a: &Path, b: &Path) -> bool {
-    matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
+/// Returns true if both are of one existing file; false on systems that do not number files.
+pub(super) fn is_one_file(a: io::Result<Metadata>, b: io::Result<Metadata>) -> bool {
+    #[cfg(unix)]
+    let number = |file: &Metadata| Some((MetadataExt::dev(file), MetadataExt::ino(file)));
+    #[cfg(not(unix))]
+    let number = |_: &Metadata| None::<(u64, u64)>;
+    a.is_ok_and(|a| b.is_ok_and(|b| number(&a).is_some() && number(&a) == number(&b)))
 }

@@ -10,15 +10,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::leftover;
-use super::place::{RANDOM, checksum};
+use super::place::{RANDOM, checksum, prefix_for};
 
 /// The characters of random names: no capitals, since some file systems ignore case.
 const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
-
-fn remove(path: &Path) {
-    // A later run sweeps what stays.
-    let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-}
 
 /// The path of a temporary file or folder, which is removed when this is dropped, unless it got another name.
 #[derive(Debug)]
@@ -32,8 +27,10 @@ impl Present {
 
 impl Drop for Present {
     fn drop(&mut self) {
-        if !self.0.as_os_str().is_empty() {
-            remove(&self.0);
+        let path = &self.0;
+        if !path.as_os_str().is_empty() {
+            // A later run sweeps what stays.
+            let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
         }
     }
 }
@@ -88,14 +85,14 @@ impl TemporaryFolder {
     /// name. Others can read it like any new folder.
     pub fn create(parent: &Path, name: &str) -> io::Result<Self> {
         leftover::sweep(parent);
-        Self::with_mode(parent, &super::place::prefix_for(Path::new(name)), 0o777)
+        Self::with_mode(parent, &prefix_for(Path::new(name)), 0o777)
     }
 
     /// Creates a folder among the system's temporary files that no other user can read.
     pub fn private(name: &str) -> io::Result<Self> {
         let parent = std::env::temp_dir();
         leftover::sweep(&parent);
-        Self::with_mode(&parent, &super::place::prefix_for(Path::new(name)), 0o700)
+        Self::with_mode(&parent, &prefix_for(Path::new(name)), 0o700)
     }
 
     pub(super) fn with_mode(parent: &Path, prefix: &OsStr, mode: u32) -> io::Result<Self> {
@@ -146,13 +143,9 @@ pub(super) fn name(prefix: &OsStr) -> OsString {
     name
 }
 
-#[cfg(unix)]
 fn make_folder(path: &Path, mode: u32) -> io::Result<()> {
-    use std::os::unix::fs::DirBuilderExt as _;
-    fs::DirBuilder::new().mode(mode).create(path)
-}
-
-#[cfg(not(unix))]
-fn make_folder(path: &Path, _: u32) -> io::Result<()> {
-    fs::create_dir(path)
+    let mut builder = fs::DirBuilder::new();
+    #[cfg(unix)]
+    std::os::unix::fs::DirBuilderExt::mode(&mut builder, mode);
+    builder.create(path)
 }

@@ -10,7 +10,7 @@ use super::{Decision, Spec};
 use mirrorstats_exact::names;
 use mirrorstats_trace::episodes::answers::{Answered, columns_of};
 use mirrorstats_trace::episodes::episode::Extra;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 use mirrorstats_trace::schema::colors::spelling;
 
 /// The answer that states a lack of evidence.
@@ -150,7 +150,6 @@ impl Answer {
     }
 }
 
-/// The columns of a key at a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     Answer,

@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Paint, is_default};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The draws from seed and run, the same for all experiments that share scenes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -97,12 +97,13 @@ pub struct Others {
     /// Their behaviour.
     #[serde(default)]
     pub behavior: Behavior,
-    /// Of a hundred episodes, those where one of them has the colour of the agent's own body; the world's if absent.
+    /// Of a hundred others, those in the colour of a candidate, each candidate equally often; the rest have any colour of
+    /// the palette. The world's if absent; without candidates it changes nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(max = 100))]
     pub twin_percent: Option<u32>,
-    /// The colour of their bodies: `own` is that of the agent's own body, `other` is drawn and never that. If absent drawn,
-    /// with one of the own colour as `twin_percent` says.
+    /// The colour of their bodies. `own` is that of the agent's own body, which gives it away. `other` is drawn and that of
+    /// no candidate, or without such a colour any but the own one. If absent drawn as `twin_percent` says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color: Option<Paint>,
 }
@@ -140,6 +141,8 @@ pub enum Wall {
     Random,
     /// Across from the first pane.
     Opposite,
+    /// That of the first pane, beside it.
+    Same,
     /// At +x.
     East,
     /// At +y.
@@ -154,7 +157,7 @@ impl Wall {
     /// Quarter turns counter-clockwise from the wall at +x; `None` if it is drawn.
     pub const fn quarter(self) -> Option<u8> {
         match self {
-            Self::Random | Self::Opposite => None,
+            Self::Random | Self::Opposite | Self::Same => None,
             Self::East => Some(0),
             Self::North => Some(1),
             Self::West => Some(2),

@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use mirrorstats_exact::names;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// A mark on a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

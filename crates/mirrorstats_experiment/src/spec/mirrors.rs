@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Wall, is_default};
 use mirrorstats_exact::names;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// A mirror, or something in a mirror's place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -32,6 +32,15 @@ pub struct Pane {
     /// Its lower edge above the floor, mm; about the world's height of centres if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bottom_mm: Option<u32>,
+    /// The first step that shows it; the first of all if absent. Before it the wall is bare.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_t: Option<u32>,
+    /// The last step that shows it; the last of all if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until_t: Option<u32>,
+    /// True if it has a frame of wood.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub frame: bool,
 }
 
 /// The kind of a pane.
@@ -57,7 +66,8 @@ pub enum Paint {
     /// The own body's.
     #[default]
     Own,
-    /// Another: that of another candidate where there are candidates.
+    /// Another: in a mirror that of another candidate where there are candidates; behind a window, which is seen without a
+    /// mirror, that of no candidate.
     Other,
     /// This one.
     #[serde(untagged)]

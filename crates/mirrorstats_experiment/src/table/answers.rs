@@ -72,12 +72,8 @@ fn truth(answer: &Answer, at: &At<'_>, faults: &mut Vec<Fault>) {
         return;
     }
     if let Some(fact) = answer.truth.filter(|fact| fact.kind() != answer.kind) {
-        let message = format!(
-            "`{}` is of type `{}`, the answer of type `{}`",
-            fact.name(),
-            fact.kind().name(),
-            answer.kind.name()
-        );
+        let [fact, of_fact, of_answer] = [fact.name(), fact.kind().name(), answer.kind.name()];
+        let message = format!("`{fact}` is of type `{of_fact}`, the answer of type `{of_answer}`");
         faults.push(at.key("truth").fault(message).help("change `type` or `truth`"));
     }
     let mut text = |text: &str, at: &At<'_>| {
@@ -100,12 +96,12 @@ pub(super) fn relations(spec: &Spec, at: &At<'_>, faults: &mut Vec<Fault>) {
         let others = spec.layout.others;
         let count = others.least.filter(|least| others.most == Some(*least)).map(|count| count as usize + 1);
         if count != Some(answer.options.len()) {
+            let options = answer.options.len();
             let message = format!(
-                "`mirror_place` needs as many options as there are bodies, the own one among them; {} options",
-                answer.options.len()
+                "`mirror_place` needs as many options as there are bodies, the own one among them; {options} options"
             );
-            faults
-                .push(at.fault(message).help("say `others` with equal `least` and `most`, one less than the options"));
+            let help = "say `others` with equal `least` and `most`, one less than the options";
+            faults.push(at.fault(message).help(help));
         } else if spec.panes.first().is_none_or(|pane| pane.kind == PaneKind::Window) {
             faults.push(at.fault("`mirror_place` needs a first mirror that is no window"));
         }

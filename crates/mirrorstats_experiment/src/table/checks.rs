@@ -2,11 +2,12 @@
 //! nothing shows.
 
 use super::super::prompt::Templates;
+use super::super::schema::ExperimentTable;
 use super::super::spec::{BodyShown, MarkColor, Paint, PaneKind, Part, Spec, Wearer};
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_metric::file::Document;
 use mirrorstats_toml_spec::{At, Fault};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The words before a prompt's list of reply keys.
 const EXACTLY: &str = "exactly these keys";
@@ -35,6 +36,19 @@ pub(super) fn prompt(spec: &Spec, templates: &Templates, at: &At<'_>, faults: &m
         );
         let at = at.get("reply").unwrap_or_else(|| at.key("prompt"));
         faults.push(at.fault(message).help("choose another `prompt`, `reply` or `decision`, or correct the prompt"));
+    }
+}
+
+/// Checks that each mark and each mirror appears before the last step.
+pub(super) fn first_steps(table: &ExperimentTable, at: &At<'_>, faults: &mut Vec<Fault>) {
+    let Some(steps) = table.steps else { return };
+    let marks = table.mark.iter().enumerate().map(|(n, mark)| ("mark", n, Some(mark.from_t)));
+    let mirrors = table.mirror.iter().enumerate().map(|(n, mirror)| ("mirror", n, mirror.from_t));
+    for (list, n, from_t) in marks.chain(mirrors) {
+        if let Some(from_t) = from_t.filter(|from_t| *from_t > steps) {
+            let at = at.key(list).item(n).key("from_t");
+            faults.push(at.fault(format!("`from_t` may be 1 to {steps}, but is {from_t}")));
+        }
     }
 }
 

@@ -5,38 +5,20 @@ use mirrorstats_toml_spec::{At, Fault};
 
 pub(super) fn panes(tables: &[MirrorTable], list: &At<'_>, faults: &mut Vec<Fault>) -> Vec<Pane> {
     let mut panes: Vec<Pane> = Vec::new();
-    for (n, table) in tables.iter().enumerate() {
-        let at = list.item(n);
+    for (table, at) in tables.iter().zip(list.items()) {
         let Some(pane) = pane(table, &at, faults) else { continue };
-        let is_across_from_none = pane.wall == Wall::Opposite && panes.is_empty();
-        let across = is_across_from_none.then_some("the first mirror is across from no other");
-        for message in across.into_iter().chain(quarrel(&panes, pane.wall)) {
-            faults.push(at.fault(message).help("use `wall = \"random\"`"));
-        }
+        let message = match (panes.first(), pane.wall) {
+            (None, Wall::Opposite) => Some("the first mirror is across from no other"),
+            (None, Wall::Same) => Some("the first mirror is beside no other"),
+            (Some(first), wall) if first.wall == Wall::Random && wall.quarter().is_some() => {
+                Some("the wall of the first mirror is drawn, and could be this one")
+            }
+            _ => None,
+        };
+        faults.extend(message.map(|message| at.fault(message).help("use `wall = \"random\"`")));
         panes.push(pane);
     }
     panes
-}
-
-/// The reason why a mirror cannot be on a wall together with the earlier ones.
-fn quarrel(before: &[Pane], wall: Wall) -> Option<&'static str> {
-    let first = before.first()?.wall.quarter();
-    let across = first.map(|quarter| (quarter + 2) % 4);
-    let quarter = |wall: Wall| if wall == Wall::Opposite { across } else { wall.quarter() };
-    match wall {
-        Wall::Random => None,
-        Wall::Opposite if before.iter().any(|pane| pane.wall == Wall::Opposite) => Some("two mirrors on one wall"),
-        Wall::Opposite | Wall::East | Wall::North | Wall::West | Wall::South => {
-            let own = quarter(wall);
-            if own.is_some() && before.iter().any(|pane| quarter(pane.wall) == own) {
-                Some("two mirrors on one wall")
-            } else if first.is_none() && wall != Wall::Opposite {
-                Some("the wall of the first mirror is drawn, and could be this one")
-            } else {
-                None
-            }
-        }
-    }
 }
 
 fn pane(table: &MirrorTable, at: &At<'_>, faults: &mut Vec<Fault>) -> Option<Pane> {
@@ -65,6 +47,14 @@ fn pane(table: &MirrorTable, at: &At<'_>, faults: &mut Vec<Fault>) -> Option<Pan
     let kind = if kind == PaneKind::Mirror && delay > 0 { PaneKind::Delayed } else { kind };
     let [width_mm, height_mm, bottom_mm] =
         [table.width, table.height, table.bottom].map(|length| length.map(millimetres));
-    let pane = Pane { kind, delay, color, body, wall: table.wall.unwrap_or_default(), width_mm, height_mm, bottom_mm };
+    let MirrorTable { from_t, until_t, .. } = *table;
+    if let (Some(from_t), Some(until_t)) = (from_t, until_t)
+        && from_t > until_t
+    {
+        let fault = at.key("until_t").fault(format!("`until_t` is {until_t}, before `from_t`, which is {from_t}"));
+        faults.push(fault.help(format!("use `until_t = {from_t}` or more")));
+    }
+    let (wall, frame) = (table.wall.unwrap_or_default(), table.frame.unwrap_or_default());
+    let pane = Pane { kind, delay, color, body, wall, width_mm, height_mm, bottom_mm, from_t, until_t, frame };
     (faults.len() == before).then_some(pane)
 }

@@ -10,7 +10,8 @@ use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::fontdb::{Database, Source};
 use resvg::usvg::{Options, Tree};
 
-use super::font;
+use super::lettering::{FAMILY, FILES};
+use crate::figure::EncodeError;
 
 /// PNG pixels per px of the figure: about 300 dpi for a figure that is 7 inches wide.
 const PNG_SCALE: f32 = 3.0;
@@ -19,41 +20,29 @@ const POINTS_PER_PX: f32 = 0.75;
 /// Only the embedded font: installed fonts are never used.
 static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
     let mut fonts = Database::new();
-    for data in font::FILES {
+    for data in FILES {
         fonts.load_font_source(Source::Binary(Arc::new(data)));
     }
-    fonts.set_sans_serif_family(font::FAMILY);
+    fonts.set_sans_serif_family(FAMILY);
     Arc::new(fonts)
 });
 
-#[derive(Debug, thiserror::Error)]
-pub enum ConvertError {
-    #[error("the figure's SVG cannot be read back; please report this with the model names of the data")]
-    Svg(#[from] resvg::usvg::Error),
-    #[error("a picture of {width} x {height} px cannot be made; take svg or pdf, or fewer models")]
-    Size { width: f32, height: f32 },
-    #[error("the figure cannot be encoded as PNG: {0}")]
-    Png(String),
-    #[error("the figure cannot be written as PDF: {0}")]
-    Pdf(String),
-}
-
-pub fn tree(svg: &str) -> Result<Tree, ConvertError> {
-    let options = Options { fontdb: FONTS.clone(), font_family: font::FAMILY.to_owned(), ..Options::default() };
+pub fn tree(svg: &str) -> Result<Tree, EncodeError> {
+    let options = Options { fontdb: FONTS.clone(), font_family: FAMILY.to_owned(), ..Options::default() };
     Ok(Tree::from_str(svg, &options)?)
 }
 
-pub fn png(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
+pub(crate) fn png(tree: &Tree) -> Result<Vec<u8>, EncodeError> {
     let (width, height) = (tree.size().width() * PNG_SCALE, tree.size().height() * PNG_SCALE);
-    let mut pixels = Pixmap::new(whole(width), whole(height)).ok_or(ConvertError::Size { width, height })?;
+    let mut pixels = Pixmap::new(whole(width), whole(height)).ok_or(EncodeError::Size { width, height })?;
     resvg::render(tree, Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
-    pixels.encode_png().map_err(|error| ConvertError::Png(error.to_string()))
+    pixels.encode_png().map_err(|error| EncodeError::Png(error.to_string()))
 }
 
 /// The picture as a one-page PDF with selectable text, without a date or a random identifier.
-pub(crate) fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
+pub(crate) fn pdf(tree: &Tree) -> Result<Vec<u8>, EncodeError> {
     let (width, height) = (tree.size().width() * POINTS_PER_PX, tree.size().height() * POINTS_PER_PX);
-    let fault = || ConvertError::Size { width, height };
+    let fault = || EncodeError::Size { width, height };
     let page = PageSettings::from_wh(width, height).ok_or_else(fault)?;
     let size = Size::from_wh(width, height).ok_or_else(fault)?;
     let settings = SerializeSettings { xmp_metadata: false, ..SerializeSettings::default() };
@@ -63,7 +52,7 @@ pub(crate) fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
     surface.draw_svg(tree, size, SvgSettings::default()).ok_or_else(fault)?;
     surface.finish();
     page.finish();
-    document.finish().map_err(|error| ConvertError::Pdf(format!("{error:?}")))
+    document.finish().map_err(|error| EncodeError::Pdf(format!("{error:?}")))
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps; 0 is refused by Pixmap")]

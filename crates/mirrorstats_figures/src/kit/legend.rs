@@ -1,12 +1,10 @@
 //! Legends: models and signs with their meanings, laid out by the measured widths of their texts.
 
-use super::frame::{Frame, Point, many};
 use super::lettering::{self, Lettering, MARGIN, NAME_ROOM};
-use super::look::{Fill, Stroke};
 use super::palette::{ModelStyle, PALETTE};
 use super::panels::Panels;
 use super::roster::Roster;
-use super::sheet::Sheet;
+use super::sheet::{Fill, Frame, Point, Sheet, Stroke, many};
 use super::{label, marker, tiles};
 
 const SWATCH_WIDTH: f64 = 24.0;
@@ -89,7 +87,7 @@ impl Legend {
 
 /// Draws signs at `corner`; returns the bottom edge, px.
 pub(crate) fn draw_signs(sheet: &mut Sheet, corner: Point, signs: Vec<(Swatch, String)>) -> f64 {
-    let legend = Legend::of_signs(signs, sheet.width() - corner.0 - MARGIN);
+    let legend = Legend::of_signs(signs, sheet.width - corner.0 - MARGIN);
     legend.draw(sheet, corner);
     corner.1 + legend.height
 }
@@ -102,7 +100,7 @@ pub(crate) fn around(
     swatch: fn(&'static ModelStyle) -> Swatch,
     signs: Vec<(Swatch, String)>,
 ) -> f64 {
-    let width = sheet.width() - 2.0 * MARGIN;
+    let width = sheet.width - 2.0 * MARGIN;
     let mut bottom = panels.bottom;
     let beside = panels.rest.map(|rest| (rest, Legend::of_models(roster, rest.width, swatch)));
     if let Some((rest, legend)) = beside.filter(|(rest, legend)| legend.height <= rest.height) {
@@ -128,9 +126,8 @@ fn swatch_room(swatch: Swatch) -> f64 {
 
 fn column_widths(labels: &[String], columns: usize, lettering: Lettering) -> (Vec<f64>, f64) {
     let rows = labels.len().div_ceil(columns).max(1);
-    let widest = |column: &[String]| column.iter().map(|label| lettering.width(label)).fold(0.0, f64::max);
-    let widths: Vec<f64> =
-        labels.chunks(rows).map(|column| SWATCH_WIDTH + SWATCH_GAP + widest(column) + COLUMN_GAP).collect();
+    let width = |column: &[String]| SWATCH_WIDTH + SWATCH_GAP + lettering.widest(column) + COLUMN_GAP;
+    let widths: Vec<f64> = labels.chunks(rows).map(width).collect();
     let all = widths.iter().sum::<f64>() - COLUMN_GAP;
     (widths, all)
 }

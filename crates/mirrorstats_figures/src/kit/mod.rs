@@ -3,28 +3,23 @@
 #[cfg(feature = "raster")]
 pub mod convert;
 
+pub(super) mod dodge;
+pub(super) mod label;
 pub(super) mod legend;
+pub(super) mod lettering;
+pub(super) mod marker;
+pub(super) mod palette;
 pub(super) mod panels;
+pub(super) mod plot;
+pub(super) mod roster;
+pub(super) mod sheet;
+pub(super) mod svg;
 pub(super) mod tiles;
 
-mod drawing;
-mod frame;
-mod plot;
-mod roster;
-mod sheet;
-
-pub use drawing::palette;
-pub(super) use drawing::{dodge, font, label, lettering, marker, picture};
-use drawing::{ink, look, mark};
-
-pub(super) use frame::{Frame, Point, many};
 pub(super) use legend::{Legend, Swatch};
-pub(super) use lettering::{FULL_WIDTH, Lettering, MARGIN, NAME_ROOM, TextAnchor, leading};
-pub(super) use look::{Fill, Rgb, Stroke};
-pub(super) use mark::Mark;
-pub(super) use marker::polar;
+pub(super) use lettering::{Lettering, MARGIN, TextAnchor, leading};
 pub(super) use palette::{PALETTE, text_on};
-pub(super) use panels::{Arrangement, Panels};
-pub(super) use plot::{Plot, Tick, rate_ticks, whole_ticks};
+pub(super) use panels::Grid;
+pub(super) use plot::{Plot, ROOM_BELOW, ROOM_LEFT, Tick, rate_ticks, whole_ticks};
 pub(super) use roster::{Member, Roster};
-pub(super) use sheet::Sheet;
+pub(super) use sheet::{Fill, Frame, Mark, Point, Rgb, Sheet, Stroke, many};

@@ -1,89 +1,78 @@
 //! Small multiples: one panel per experiment, in rows, each under its heading.
 
-use super::frame::{Frame, Point, many};
 use super::label;
 use super::lettering::{self, MARGIN, leading};
-use super::sheet::Sheet;
+use super::sheet::{Frame, Sheet, many};
+
+/// The columns of panels on a sheet of `width` px.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Grid {
+    pub width: f64,
+    pub left: f64,
+    /// The distance between two columns, px.
+    pub gap: f64,
+    pub columns: usize,
+}
 
 #[derive(Clone, Debug)]
 pub(crate) struct Panels {
     /// The frame below each heading.
     pub bodies: Vec<Frame>,
-    headings: Vec<(Point, String, Vec<String>)>,
     pub bottom: f64,
     /// The place after the last panel if the last row is not full, including its heading.
     pub rest: Option<Frame>,
 }
 
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Arrangement {
-    pub left: f64,
-    pub columns: usize,
-    /// The height of a panel without its heading, px.
-    pub height: f64,
-    pub gap: f64,
-}
+impl Grid {
+    /// The same with fewer columns if a panel would have less than `least` px.
+    pub(crate) fn at_least(self, least: f64) -> Self {
+        let room = self.width - self.left - MARGIN;
+        let fits = |&n: &usize| least * many(n) + self.gap * many(n - 1) <= room;
+        Self { columns: (1..=self.columns).rev().find(fits).unwrap_or(1), ..self }
+    }
 
-impl Panels {
-    /// A panel for each of `names` on a sheet of `width` px, with a title of up to two lines if `titles` has one.
-    pub(crate) fn new(names: &[&str], titles: &[&str], width: f64, arranged: Arrangement) -> Self {
-        let Arrangement { left, columns, height, gap } = arranged;
-        let room = width - left - MARGIN;
-        let panel = (room - gap * many(columns - 1)) / many(columns);
+    /// The same with fewer columns if that gives `count` panels in about equally full rows.
+    pub(crate) fn balanced(self, count: usize) -> Self {
+        let rows = count.div_ceil(self.columns).max(1);
+        Self { columns: count.div_ceil(rows).max(1), ..self }
+    }
+
+    /// The width of a panel, px.
+    pub(crate) fn panel(self) -> f64 {
+        (self.width - self.left - MARGIN - self.gap * many(self.columns - 1)) / many(self.columns)
+    }
+
+    /// A sheet with a panel for each of `names`, with a title of up to two lines if `titles` has one. A panel has
+    /// `height` px below its heading.
+    pub(crate) fn panels(self, names: &[&str], titles: &[&str], height: f64) -> (Sheet, Panels) {
+        let Self { width, left, gap, columns } = self;
+        let panel = self.panel();
         let title = |at: usize| title_lines(titles.get(at).unwrap_or(&""), panel);
-        let lines: Vec<Vec<String>> = (0..names.len()).map(title).collect();
-        let most = lines.iter().map(Vec::len).max().unwrap_or(0);
-        let head = leading(lettering::heading()) + leading(lettering::tick()) * many(most) + 6.0;
+        let titles: Vec<Vec<String>> = (0..names.len()).map(title).collect();
+        let most = titles.iter().map(Vec::len).max().unwrap_or(0);
+        let (heading, line) = (leading(lettering::heading()), leading(lettering::tick()));
+        let head = heading + line * many(most) + 6.0;
         let row_height = head + height + 14.0;
         let corner = |at: usize| (left + (panel + gap) * many(at % columns), MARGIN + row_height * many(at / columns));
-        let place = |at: usize| {
-            let (x, y) = corner(at);
-            Frame::new(x, y + head, panel, height)
-        };
-        let count = names.len();
-        let rows = count.div_ceil(columns);
-        let rest = (!count.is_multiple_of(columns)).then(|| {
-            let (x, y) = corner(count);
-            Frame::new(x, y, width - MARGIN - x, head + height)
-        });
-        let names = label::fitted(names, panel, lettering::heading());
-        let headings = names.into_iter().zip(lines).enumerate();
-        let headings = headings.map(|(at, (name, lines))| (corner(at), name, lines)).collect();
-        let bodies = (0..count).map(place).collect();
-        Self { bodies, headings, bottom: MARGIN + row_height * many(rows) - 14.0, rest }
-    }
-
-    pub(crate) fn sheet(&self, width: f64) -> Sheet {
         let mut sheet = Sheet::new(width);
-        for ((x, y), name, lines) in &self.headings {
-            let mut middle = y + leading(lettering::heading()) / 2.0;
-            sheet.text((*x, middle), name, lettering::heading());
-            middle += leading(lettering::heading()) / 2.0 + leading(lettering::tick()) / 2.0;
-            for line in lines {
-                sheet.text((*x, middle), line, lettering::tick());
-                middle += leading(lettering::tick());
+        let mut bodies = Vec::with_capacity(names.len());
+        let headings = label::fitted(names, panel, lettering::heading());
+        for (at, (name, title)) in headings.iter().zip(&titles).enumerate() {
+            let (x, y) = corner(at);
+            sheet.text((x, y + heading / 2.0), name, lettering::heading());
+            let mut middle = y + heading / 2.0 + (heading / 2.0 + line / 2.0);
+            for text in title {
+                sheet.text((x, middle), text, lettering::tick());
+                middle += line;
             }
+            bodies.push(Frame::new(x, y + head, panel, height));
         }
-        sheet
+        let (x, y) = corner(names.len());
+        let rest = Frame::new(x, y, width - MARGIN - x, head + height);
+        let rest = (!names.len().is_multiple_of(columns)).then_some(rest);
+        let bottom = MARGIN + row_height * many(names.len().div_ceil(columns)) - 14.0;
+        (sheet, Panels { bodies, bottom, rest })
     }
-}
-
-/// The columns for `count` panels of at least `least` px in `room` px, at most `most`, in about equally full rows.
-pub(crate) fn fitting(count: usize, most: usize, room: f64, [least, gap]: [f64; 2]) -> usize {
-    balanced(count, self::most(most, room, [least, gap]).0)
-}
-
-/// The most columns of panels of at least `least` px in `room` px, up to `most`; and the width of a panel, px.
-pub(crate) fn most(most: usize, room: f64, [least, gap]: [f64; 2]) -> (usize, f64) {
-    let fits = |&n: &usize| least * many(n) + gap * many(n - 1) <= room;
-    let columns = (1..=most).rev().find(fits).unwrap_or(1);
-    (columns, (room - gap * many(columns - 1)) / many(columns))
-}
-
-/// The columns for `count` panels, at most `most`, in about equally full rows.
-pub(crate) fn balanced(count: usize, most: usize) -> usize {
-    let rows = count.div_ceil(most.max(1)).max(1);
-    count.div_ceil(rows).max(1)
 }
 
 fn title_lines(title: &str, room: f64) -> Vec<String> {

@@ -7,18 +7,19 @@ use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::ranged1d::{BoldPoints, Ranged};
 use plotters::coord::types::RangedCoordf64;
 
-use super::frame::{Frame, Point};
-use super::ink::UNITS_PER_PX;
 use super::lettering::{self, TextAnchor};
-use super::look::Stroke;
 use super::palette::PALETTE;
-use super::sheet::{Sheet, lattice};
-use mirrorstats_exact::number::Decimal;
+use super::sheet::{Frame, Point, Sheet, Stroke};
+use super::svg::{px, units};
+
+/// Room for the numbers and the title of an axis, px.
+pub(crate) const ROOM_LEFT: f64 = 34.0;
+pub(crate) const ROOM_BELOW: f64 = 28.0;
 
 /// Two linear axes over a frame; y points up.
 pub(crate) struct Plot {
     pub frame: Frame,
-    spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
+    axes: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -30,20 +31,39 @@ pub(crate) struct Tick {
 
 impl Plot {
     pub(crate) fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
-        let (left, top) = lattice((frame.left, frame.top));
-        let (right, bottom) = lattice((frame.right(), frame.bottom()));
-        Self { frame, spec: Cartesian2d::new(x, y, (left..right, bottom..top)) }
+        let [(left, top), (right, bottom)] = [(frame.left, frame.top), (frame.right(), frame.bottom())].map(units);
+        Self { frame, axes: Cartesian2d::new(x, y, (left..right, bottom..top)) }
     }
 
     pub(crate) fn at(&self, x: f64, y: f64) -> Point {
-        let (x, y) = self.spec.translate(&(x, y));
-        (f64::from(x) / UNITS_PER_PX, f64::from(y) / UNITS_PER_PX)
+        let (x, y) = self.axes.translate(&(x, y));
+        (px(x), px(y))
     }
 
-    pub(crate) fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+    pub(crate) fn x(&self, value: f64) -> f64 {
+        self.at(value, 0.0).0
+    }
+
+    pub(crate) fn y(&self, value: f64) -> f64 {
+        self.at(0.0, value).1
+    }
+
+    pub(crate) fn axes(&self, sheet: &mut Sheet, x: (&[Tick], &str), y: (&[Tick], &str)) {
+        self.x_ticks(sheet, x.0);
+        self.y_ticks(sheet, y.0);
+        self.x_title(sheet, x.1);
+        self.y_title(sheet, y.1, 26.0);
+    }
+
+    pub(crate) fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick], title: &str) {
+        self.x_ticks(sheet, ticks);
+        self.x_title(sheet, title);
+    }
+
+    fn x_ticks(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(TextAnchor::Middle);
         for tick in ticks {
-            let x = self.at(tick.at, 0.0).0;
+            let x = self.x(tick.at);
             sheet.line(&[(x, self.frame.top), (x, self.frame.bottom())], grid());
             if !tick.text.is_empty() {
                 sheet.text((x, self.frame.bottom() + 8.0), &tick.text, lettering);
@@ -51,10 +71,10 @@ impl Plot {
         }
     }
 
-    pub(crate) fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+    pub(crate) fn y_ticks(&self, sheet: &mut Sheet, ticks: &[Tick]) {
         let lettering = lettering::tick().aligned(TextAnchor::End);
         for tick in ticks {
-            let y = self.at(0.0, tick.at).1;
+            let y = self.y(tick.at);
             sheet.line(&[(self.frame.left, y), (self.frame.right(), y)], grid());
             if !tick.text.is_empty() {
                 sheet.text((self.frame.left - 5.0, y), &tick.text, lettering);
@@ -62,7 +82,7 @@ impl Plot {
         }
     }
 
-    pub(crate) fn x_title(&self, sheet: &mut Sheet, text: &str) {
+    fn x_title(&self, sheet: &mut Sheet, text: &str) {
         let at = (self.frame.center().0, self.frame.bottom() + 20.0);
         sheet.text(at, text, lettering::label().aligned(TextAnchor::Middle));
     }
@@ -74,17 +94,21 @@ impl Plot {
     }
 }
 
-/// 0, 0.5 and 1 with numbers, the quarters only as grid lines.
-pub(crate) fn rate_ticks() -> Vec<Tick> {
+/// The quarters of an axis from 0 to 1; only 0, a half and 1 have a text.
+pub(crate) fn quarters(zero: &str, half: &str, one: &str) -> [Tick; 5] {
     let tick = |(at, text): (f64, &str)| Tick { at, text: text.to_owned() };
-    [(0.0, "0"), (0.25, ""), (0.5, "0.5"), (0.75, ""), (1.0, "1")].map(tick).into()
+    [(0.0, zero), (0.25, ""), (0.5, half), (0.75, ""), (1.0, one)].map(tick)
+}
+
+pub(crate) fn rate_ticks() -> [Tick; 5] {
+    quarters("0", "0.5", "1")
 }
 
 /// At most `most` integers from 0 to `last`, at even distances.
 pub(crate) fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
     let axis = RangedCoordf64::from(0.0..f64::from(last));
     let whole = axis.key_points(BoldPoints(most)).into_iter().filter(|at| at.fract() == 0.0);
-    whole.filter_map(|at| Some(Tick { at, text: Decimal::of_float(at, 0)?.to_string() })).collect()
+    whole.map(|at| Tick { at, text: at.to_string() }).collect()
 }
 
 fn grid() -> Stroke {
@@ -94,7 +118,7 @@ fn grid() -> Stroke {
 #[cfg(test)]
 mod tests {
     use super::{Plot, whole_ticks};
-    use crate::kit::frame::Frame;
+    use crate::kit::sheet::Frame;
 
     #[test]
     fn the_corners_of_the_values_are_the_corners_of_the_frame() {

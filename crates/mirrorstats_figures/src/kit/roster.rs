@@ -1,8 +1,5 @@
 //! The models of a report, in the order of every figure, each with the same style in all figures.
 
-use std::cmp::Ordering;
-use std::collections::BTreeMap;
-
 use super::palette::{ModelStyle, PALETTE};
 
 #[derive(Clone, Copy, Debug)]
@@ -20,16 +17,17 @@ impl<'a> Roster<'a> {
     /// The style of a pinned model never changes. The others get, by name, the styles after the pinned ones, then
     /// unused pinned styles; styles repeat from the 21st model on.
     pub(crate) fn new(models: &[&'a str], order: &[String]) -> Self {
-        let mut models = models.to_vec();
+        let (pinned, mut models) = (&PALETTE.pinned, models.to_vec());
         models.sort_unstable();
-        models.dedup();
-        let styles = styles(&models);
-        let rank = |model: &str| (place(order, model), place(&PALETTE.pinned, model));
-        models.sort_by(|a, b| match rank(a).cmp(&rank(b)) {
-            Ordering::Equal => a.cmp(b),
-            by_rank => by_rank,
-        });
-        Self(models.into_iter().map(|model| Member { model, style: &PALETTE.style[styles[model]] }).collect())
+        let is_free = |style: &usize| !models.contains(&pinned[*style].as_str());
+        let mut free = (pinned.len()..PALETTE.style.len()).chain((0..pinned.len()).filter(is_free)).cycle();
+        let member = |model: &&'a str| {
+            let style = pinned.iter().position(|known| known == model).or_else(|| free.next()).unwrap_or(0);
+            Member { model, style: &PALETTE.style[style] }
+        };
+        let mut members: Vec<Member<'a>> = models.iter().map(member).collect();
+        members.sort_by_key(|member| (place(order, member.model), place(pinned, member.model)));
+        Self(members)
     }
 
     pub(crate) fn names(&self) -> Vec<&'a str> {
@@ -39,16 +37,6 @@ impl<'a> Roster<'a> {
 
 fn place(names: &[String], name: &str) -> usize {
     names.iter().position(|known| known == name).unwrap_or(names.len())
-}
-
-fn styles<'a>(models: &[&'a str]) -> BTreeMap<&'a str, usize> {
-    let pinned = PALETTE.pinned.len();
-    let is_free = |style: &usize| !models.contains(&PALETTE.pinned[*style].as_str());
-    let free = (pinned..PALETTE.style.len()).chain((0..pinned).filter(is_free)).cycle();
-    let (known, others): (Vec<_>, Vec<_>) = models.iter().partition(|model| place(&PALETTE.pinned, model) < pinned);
-    let mut styles: BTreeMap<_, _> = known.into_iter().map(|model| (model, place(&PALETTE.pinned, model))).collect();
-    styles.extend(others.into_iter().zip(free));
-    styles
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
-//! The sheet for drawing a figure: a few functions in px over plotters' elements, and groups that carry values.
+//! The sheet of a figure: plotters' elements in px from the top left corner, and groups that carry values.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 use std::rc::Rc;
 
 use base64::Engine as _;
@@ -9,152 +10,275 @@ use base64::engine::general_purpose::STANDARD;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, Drawable, PathElement, PointCollection, Polygon, Rectangle, Text};
-use plotters::style::text_anchor::{HPos, Pos, VPos};
-use plotters::style::{Color as _, FontDesc, FontFamily, FontStyle, FontTransform, RGBColor, ShapeStyle, TextStyle};
-use plotters_backend::BackendCoord;
+use plotters::style::{Color, ShapeStyle};
+use plotters_backend::{BackendColor, BackendCoord};
+use serde::Deserialize;
 
-use super::font::{self, Weight};
-use super::frame::{Frame, Point};
-use super::ink::{Ink, UNITS_PER_PX};
-use super::lettering::{Lettering, TextAnchor};
-use super::look::{Fill, Rgb, Stroke};
-use super::mark::Mark;
+use super::lettering::{self, Lettering};
+use super::svg::{SvgBackend, escaped, px, size_units, units};
+use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::fixed;
+use mirrorstats_exact::number::full_precision;
+use mirrorstats_statistics::intervals::interval::Interval;
+
+/// A point: right, down.
+pub type Point = (f64, f64);
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Frame {
+    pub left: f64,
+    pub top: f64,
+    pub width: f64,
+    pub height: f64,
+}
+
+impl Frame {
+    pub const fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
+        Self { left, top, width, height }
+    }
+
+    pub fn right(self) -> f64 {
+        self.left + self.width
+    }
+
+    pub fn bottom(self) -> f64 {
+        self.top + self.height
+    }
+
+    pub fn center(self) -> Point {
+        (self.left + self.width / 2.0, self.top + self.height / 2.0)
+    }
+
+    pub(crate) fn inset(self, by: f64) -> Self {
+        Self::new(self.left + by, self.top + by, self.width - 2.0 * by, self.height - 2.0 * by)
+    }
+}
+
+pub(crate) fn many(things: usize) -> f64 {
+    // Counts of drawn things are far below billions.
+    f64::from(u32::try_from(things).unwrap_or(u32::MAX))
+}
+
+/// A colour, written `#rrggbb`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct Rgb(pub u8, pub u8, pub u8);
+
+impl TryFrom<String> for Rgb {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        let fault = || format!("expected a colour such as `#0063a6`, found `{text}`");
+        let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6).ok_or_else(fault)?;
+        let value = u32::from_str_radix(digits, 16).map_err(|_| fault())?;
+        let [_, red, green, blue] = value.to_be_bytes();
+        Ok(Self(red, green, blue))
+    }
+}
+
+impl fmt::Display for Rgb {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
+    }
+}
+
+impl Color for Rgb {
+    fn to_backend_color(&self) -> BackendColor {
+        BackendColor { rgb: (self.0, self.1, self.2), alpha: 1.0 }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stroke {
+    pub color: Rgb,
+    pub width: f64,
+    /// Alternating lengths of ink and gap, px; empty for a solid line.
+    pub dash: &'static [f64],
+}
+
+impl Stroke {
+    pub const fn solid(color: Rgb, width: f64) -> Self {
+        Self { color, width, dash: &[] }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fill {
+    pub color: Rgb,
+    opacity: f64,
+    /// The line around it, drawn half inside: its colour and width, px.
+    outline: Option<(Rgb, f64)>,
+}
+
+impl Fill {
+    pub const fn plain(color: Rgb) -> Self {
+        Self { color, opacity: 1.0, outline: None }
+    }
+
+    pub(crate) const fn outlined(color: Rgb, outline: Rgb, width: f64) -> Self {
+        Self { color, opacity: 1.0, outline: Some((outline, width)) }
+    }
+
+    fn style(self) -> ShapeStyle {
+        self.color.mix(self.opacity).filled()
+    }
+
+    /// The outline as attributes: plotters either fills a shape or draws its outline.
+    fn outline_attributes(self) -> String {
+        let outline = self.outline.map(|(color, width)| format!(" stroke=\"{color}\" stroke-width=\"{width}\""));
+        outline.unwrap_or_default()
+    }
+}
 
 /// A figure in progress. Elements below its final height must not be drawn.
 #[derive(Debug)]
 pub struct Sheet {
-    ink: Rc<RefCell<Ink>>,
-    width: f64,
+    svg: Rc<RefCell<SvgBackend>>,
+    pub(crate) width: f64,
 }
 
 impl Sheet {
     pub fn new(width: f64) -> Self {
-        Self { ink: Rc::default(), width }
+        Self { svg: Rc::default(), width }
     }
 
-    pub const fn width(&self) -> f64 {
-        self.width
+    /// The elements that were drawn, as SVG.
+    pub(crate) fn into_body(self) -> String {
+        self.svg.take().body
     }
 
-    pub fn line(&mut self, points: &[Point], stroke: Stroke) {
-        let points: Vec<_> = points.iter().map(|&at| lattice(at)).collect();
-        let style =
-            ShapeStyle { color: RGBColor::from(stroke.color).into(), filled: false, stroke_width: units(stroke.width) };
-        self.put(&PathElement::new(points, style), dash_attribute(stroke));
+    pub fn line(&mut self, points: &[Point], Stroke { color, width, dash }: Stroke) {
+        let points: Vec<_> = points.iter().copied().map(units).collect();
+        let dash = dash.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
+        let dash = if dash.is_empty() { dash } else { format!(" stroke-dasharray=\"{dash}\"") };
+        self.draw(&PathElement::new(points, color.stroke_width(size_units(width))), dash);
     }
 
     pub(crate) fn polygon(&mut self, corners: &[Point], fill: Fill) {
-        let corners: Vec<_> = corners.iter().map(|&at| lattice(at)).collect();
-        self.put(&Polygon::new(corners, shape(fill)), outline_attributes(fill));
+        let corners: Vec<_> = corners.iter().copied().map(units).collect();
+        self.draw(&Polygon::new(corners, fill.style()), fill.outline_attributes());
     }
 
     pub fn rectangle(&mut self, frame: Frame, fill: Fill) {
-        let corners = [lattice((frame.left, frame.top)), lattice((frame.right(), frame.bottom()))];
-        self.put(&Rectangle::new(corners, shape(fill)), outline_attributes(fill));
-    }
-
-    /// Draws filled rectangles side by side, with the same top and height: pairs of left and right ends, ascending.
-    /// Many of them take little space in the file.
-    pub(crate) fn bars(&mut self, ends: &[(f64, f64)], top: f64, height: f64, color: Rgb) {
-        let ends: Vec<_> =
-            ends.iter().map(|&(left, right)| (lattice((left, top)).0, lattice((right, top)).0)).collect();
-        let middle = lattice((0.0, top + height / 2.0)).1;
-        self.ink.borrow_mut().bars(&ends, middle, units(height), color);
+        let corners = [(frame.left, frame.top), (frame.right(), frame.bottom())].map(units);
+        self.draw(&Rectangle::new(corners, fill.style()), fill.outline_attributes());
     }
 
     pub(crate) fn circle(&mut self, center: Point, radius: f64, fill: Fill) {
-        self.put(&Circle::new(lattice(center), units(radius), shape(fill)), outline_attributes(fill));
+        self.draw(&Circle::new(units(center), size_units(radius), fill.style()), fill.outline_attributes());
     }
 
     /// Draws one line of text, with the middle of its capitals at the height of `at`.
-    pub fn text(&mut self, at: Point, text: &str, lettering: Lettering) {
-        let drop = font::drop_to_baseline(lettering.size);
-        let at = if lettering.upwards { (at.0 + drop, at.1) } else { (at.0, at.1 + drop) };
-        let style = text_style(lettering);
-        self.put(&Text::new(font::drawable(text), lattice(at), style), String::new());
+    pub fn text(&mut self, (x, y): Point, text: &str, lettering: Lettering) {
+        let drop = lettering::drop_to_baseline(lettering.size);
+        let at = if lettering.upwards { (x + drop, y) } else { (x, y + drop) };
+        self.draw(&Text::new(lettering::drawable(text), units(at), lettering.style()), String::new());
+    }
+
+    /// Draws filled rectangles side by side, with the same top and height: pairs of left and right ends, ascending.
+    /// One path of relative steps, so that many of them take little space in the file.
+    pub(crate) fn bars(&mut self, ends: &[(f64, f64)], top: f64, height: f64, color: Rgb) {
+        let mut path = String::new();
+        let mut at = None;
+        for &(left, right) in ends {
+            let (left, y) = units((left, top + height / 2.0));
+            let (right, _) = units((right, top));
+            let _ = match at {
+                None => write!(path, "M{} {}", px(left), px(y)),
+                Some(at) => write!(path, "m{} 0", px(left - at)),
+            };
+            let _ = write!(path, "h{}", px(right - left));
+            at = Some(right);
+        }
+        if at.is_some() {
+            let width = px(size_units(height));
+            self.write(format_args!("<path d=\"{path}\" stroke=\"{color}\" stroke-width=\"{width}\"/>"));
+        }
     }
 
     pub(crate) fn picture(&mut self, frame: Frame, png: &[u8]) {
         let [left, top, width, height] =
             [frame.left, frame.top, frame.width, frame.height].map(|length| fixed(Some(length), 2));
-        let _ = writeln!(
-            self.ink.borrow_mut().body,
-            "<image x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" \
-             preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
-            STANDARD.encode(png)
-        );
+        let png = STANDARD.encode(png);
+        self.write(format_args!(
+            "<image x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" preserveAspectRatio=\"none\" \
+             href=\"data:image/png;base64,{png}\"/>"
+        ));
     }
 
     pub fn mark(&mut self, mark: &Mark, draw: impl FnOnce(&mut Self)) {
-        self.ink.borrow_mut().body.push_str(&mark.opening());
+        let value = |(name, value): &(_, String)| format!(" data-{name}=\"{}\"", escaped(&visible(value)));
+        let (data, title): (String, _) = (mark.data.iter().map(value).collect(), escaped(&visible(&mark.title)));
+        self.write(format_args!("<g class=\"mark\"{data}><title>{title}</title>"));
         draw(self);
-        self.ink.borrow_mut().body.push_str("</g>\n");
+        self.write(format_args!("</g>"));
     }
 
-    /// The elements that were drawn, as SVG.
-    pub(crate) fn into_body(self) -> String {
-        self.ink.take().body
-    }
-
-    fn put<E>(&mut self, element: &E, extra: String)
+    fn draw<E>(&self, element: &E, extra: String)
     where
         for<'a> &'a E: PointCollection<'a, BackendCoord>,
-        E: Drawable<Ink>,
+        E: Drawable<SvgBackend>,
     {
-        self.ink.borrow_mut().extra = extra;
-        let area: DrawingArea<Ink, Shift> = (&self.ink).into();
-        area.draw(element).expect("writing to a string does not fail, and nobody else holds the ink");
+        self.svg.borrow_mut().extra = extra;
+        let area: DrawingArea<SvgBackend, Shift> = (&self.svg).into();
+        area.draw(element).expect("writing to a string does not fail, and nobody else holds the backend");
+    }
+
+    /// Writes a line that plotters has no element for.
+    fn write(&self, line: fmt::Arguments<'_>) {
+        let _ = writeln!(self.svg.borrow_mut().body, "{line}");
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "`as` clamps, and sheets are small")]
-pub(super) fn lattice((x, y): Point) -> BackendCoord {
-    let place = |px: f64| (px * UNITS_PER_PX).round() as i32;
-    (place(x), place(y))
+/// The data behind a mark: its title on hover, and its values as attributes for programs.
+///
+/// Rule: `data-value` has all digits, as in `cells.csv`, and is empty without a value. Names are spelled as on the
+/// page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    title: String,
+    data: Vec<(Cow<'static, str>, String)>,
 }
 
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps, and sizes are small")]
-fn units(px: f64) -> u32 {
-    (px * UNITS_PER_PX).round() as u32
-}
+impl Mark {
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), data: Vec::new() }
+    }
 
-fn shape(fill: Fill) -> ShapeStyle {
-    ShapeStyle { color: RGBColor::from(fill.color).mix(fill.opacity), filled: true, stroke_width: 0 }
-}
+    pub fn of_cell(title: String, experiment: &str, model: &str, metric: &str) -> Self {
+        Self::new(title).with("experiment", experiment).with("model", model).with("metric", metric)
+    }
 
-fn text_style(lettering: Lettering) -> TextStyle<'static> {
-    let style = match lettering.weight {
-        Weight::Regular => FontStyle::Normal,
-        Weight::Semibold => FontStyle::Bold,
-    };
-    let turn = if lettering.upwards { FontTransform::Rotate270 } else { FontTransform::None };
-    let font = FontDesc::new(FontFamily::Name(font::FAMILY), lettering.size * UNITS_PER_PX, style).transform(turn);
-    let h_pos = match lettering.align {
-        TextAnchor::Start => HPos::Left,
-        TextAnchor::Middle => HPos::Center,
-        TextAnchor::End => HPos::Right,
-    };
-    let color = RGBColor::from(lettering.color).to_backend_color();
-    TextStyle { font, color, pos: Pos::new(h_pos, VPos::Center) }
-}
+    /// Adds a value as `data-NAME`; a name already in use gets a dash.
+    #[expect(clippy::needless_pass_by_value, reason = "numbers and text alike, as they come")]
+    pub fn with(mut self, name: impl Into<Cow<'static, str>>, value: impl ToString) -> Self {
+        let mut name = name.into();
+        while self.data.iter().any(|(known, _)| *known == name) {
+            name.to_mut().push('-');
+        }
+        self.data.push((name, value.to_string()));
+        self
+    }
 
-fn dash_attribute(stroke: Stroke) -> String {
-    let lengths: Vec<_> = stroke.dash.iter().map(f64::to_string).collect();
-    if lengths.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{}\"", lengths.join(" ")) }
-}
+    pub fn value(self, value: Option<f64>) -> Self {
+        self.number("value", value)
+    }
 
-fn outline_attributes(fill: Fill) -> String {
-    let Some(stroke) = fill.outline else { return String::new() };
-    let dash = dash_attribute(stroke);
-    format!(" stroke=\"{}\" stroke-width=\"{}\"{dash}", stroke.color, stroke.width)
+    /// Adds a number in full precision; empty without one.
+    pub fn number(self, name: impl Into<Cow<'static, str>>, value: Option<f64>) -> Self {
+        self.with(name, value.map(full_precision).unwrap_or_default())
+    }
+
+    pub fn interval(self, bounds: Option<Interval>) -> Self {
+        self.number("low", bounds.map(|bounds| bounds.low)).number("high", bounds.map(|bounds| bounds.high))
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Fill, Frame, Lettering, Rgb, Sheet, Stroke, TextAnchor};
-    use crate::kit::mark::Mark;
-    use crate::kit::picture::Figure;
+    use super::{Fill, Frame, Lettering, Mark, Rgb, Sheet, Stroke};
+    use crate::Figure;
+    use crate::kit::TextAnchor;
 
     #[test]
     fn a_small_drawing_is_this_text() {
@@ -163,11 +287,7 @@ mod tests {
         let dashed = Stroke { color: black, width: 1.5, dash: &[2.0, 1.0] };
         sheet.line(&[(1.0, 2.0), (3.25, 4.5)], dashed);
         sheet.mark(&Mark::new("a < b").with("model", "\"x\"").value(Some(1.0 / 3.0)), |sheet| {
-            sheet.circle(
-                (10.0, 10.0),
-                2.5,
-                Fill { color: red, opacity: 0.5, outline: Some(Stroke::solid(black, 0.5)) },
-            );
+            sheet.circle((10.0, 10.0), 2.5, Fill { opacity: 0.5, ..Fill::outlined(red, black, 0.5) });
             sheet.rectangle(Frame::new(0.0, 0.0, 4.0, 3.0), Fill::plain(red));
         });
         sheet.text((20.0, 10.0), "T & A", Lettering::new(10.0, black).semibold().aligned(TextAnchor::Middle));

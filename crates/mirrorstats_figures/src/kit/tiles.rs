@@ -1,11 +1,8 @@
 //! Cells of a heat map: a coloured value, hatched if undefined, crossed without episodes.
 
-use super::frame::{Frame, Point, many};
-use super::label;
 use super::lettering::{self, Lettering, TextAnchor};
-use super::look::{Fill, Rgb, Stroke};
 use super::palette::{PALETTE, text_on};
-use super::sheet::Sheet;
+use super::sheet::{Fill, Frame, Point, Rgb, Sheet, Stroke, many};
 
 /// A value: its colour, and the first of `texts` that fits into the cell.
 pub(crate) fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String]) {
@@ -25,7 +22,7 @@ pub(crate) fn undefined(sheet: &mut Sheet, frame: Frame) {
     for c in lines {
         let from = ((c - frame.height).max(0.0), c.min(frame.height));
         let to = (c.min(frame.width), (c - frame.width).max(0.0));
-        sheet.line(&[within(frame, from), within(frame, to)], stroke);
+        sheet.line(&[from, to].map(|(x, y)| (frame.left + x, frame.top + y)), stroke);
     }
     let text = lettering::value().aligned(TextAnchor::Middle);
     let (x, y) = frame.center();
@@ -60,17 +57,6 @@ pub(crate) fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rg
     bar.right() + 6.0 + lettering.width(ends[1])
 }
 
-pub(crate) fn row_labels(names: &[&str], room: f64) -> (Vec<String>, f64) {
-    let lettering = lettering::label();
-    let labels = label::fitted(names, room, lettering);
-    let width = labels.iter().map(|label| lettering.width(label)).fold(0.0, f64::max);
-    (labels, width)
-}
-
 fn framed() -> Fill {
     Fill::outlined(PALETTE.surface.paper, PALETTE.surface.hatch, 0.6)
-}
-
-fn within(frame: Frame, (x, y): Point) -> Point {
-    (frame.left + x, frame.top + y)
 }

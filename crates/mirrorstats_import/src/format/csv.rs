@@ -2,41 +2,56 @@
 
 use std::fs::File;
 use std::io::{BufReader, Seek as _};
+use std::sync::Arc;
 
-use ::csv::{ReaderBuilder, StringRecord};
+use ::csv::{Error, ReaderBuilder, StringRecord};
+use arrow::array::{ArrayRef, LargeStringBuilder};
 
-use super::RowSink;
+use crate::arrays::table;
 use crate::error::ImportError;
-use crate::value::LineValue;
+use crate::rows::Rows;
 use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::input;
 
 const LONGEST_HEADER: Limit = Limit::new("bytes in the header of a table", 1 << 20);
+const BATCH_ROWS: usize = 4096;
+const BATCH_BYTES: usize = 4 << 20;
 
-pub(super) fn read(mut file: &File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
-    let failed = || ImportError::read(&rows.file);
-    let header = mirrorstats_exact::input::line(&mut BufReader::new(file), LONGEST_HEADER).map_err(failed())?;
-    file.rewind().map_err(failed())?;
+pub(super) fn read(mut reader: BufReader<File>, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+    let header = input::line(&mut reader, LONGEST_HEADER).map_err(ImportError::read(&rows.file))?;
+    reader.rewind().map_err(ImportError::read(&rows.file))?;
     let is_tabbed = header.contains(&b'\t') && !header.contains(&b',');
-    let mut reader =
-        ReaderBuilder::new().delimiter(if is_tabbed { b'\t' } else { b',' }).from_reader(BufReader::new(file));
+    let mut reader = ReaderBuilder::new().delimiter(if is_tabbed { b'\t' } else { b',' }).from_reader(reader);
     let names = reader.headers().map_err(|error| unreadable(rows, &error))?.clone();
-    if let Some(twice) = names.iter().enumerate().find(|(at, name)| names.iter().take(*at).any(|other| other == *name))
+    if let Some((_, name)) =
+        names.iter().enumerate().find(|(at, name)| names.iter().take(*at).any(|other| other == *name))
     {
-        let found = format!("`{}` twice", mirrorstats_exact::escape::visible(twice.1));
+        let found = format!("`{}` twice", mirrorstats_exact::escape::visible(name));
         return Err(rows.fault("line 1", "a header with each name once", found, "rename one of the columns"));
     }
     let mut record = StringRecord::new();
-    while reader.read_record(&mut record).map_err(|error| unreadable(rows, &error))? {
-        rows.add_cells(&names.iter().zip(record.iter().map(value)).collect::<Vec<_>>())?;
+    loop {
+        let mut columns: Vec<_> = names.iter().map(|_| LargeStringBuilder::new()).collect();
+        let (mut count, mut bytes) = (0, 0);
+        while count < BATCH_ROWS
+            && bytes < BATCH_BYTES
+            && reader.read_record(&mut record).map_err(|error| unreadable(rows, &error))?
+        {
+            for (column, cell) in columns.iter_mut().zip(&record) {
+                column.append_option(Some(cell).filter(|cell| !cell.is_empty()));
+            }
+            (count, bytes) = (count + 1, bytes + record.as_slice().len());
+        }
+        if count == 0 {
+            return Ok(());
+        }
+        let columns = columns.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef);
+        let columns = names.iter().map(str::to_owned).zip(columns).collect();
+        rows.add_table(&table(columns, count))?;
     }
-    Ok(())
 }
 
-fn value(cell: &str) -> LineValue {
-    if cell.is_empty() { LineValue::Null } else { LineValue::Cell(cell.to_owned()) }
-}
-
-fn unreadable(rows: &RowSink<'_>, error: &::csv::Error) -> ImportError {
+fn unreadable(rows: &Rows<'_>, error: &Error) -> ImportError {
     let line = error.position().map(|at| format!("line {}", at.line())).unwrap_or_default();
     let help = "write it with commas, quotes around cells with commas, and a header";
     rows.fault(&line, "a record with the cells of the header, in UTF-8", error.to_string(), help)

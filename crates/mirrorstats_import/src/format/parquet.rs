@@ -9,8 +9,8 @@ use ::parquet::schema::types::Type;
 use arrow::array::RecordBatch;
 use arrow::datatypes::DataType;
 
-use super::RowSink;
 use crate::error::{Fault, ImportError};
+use crate::rows::Rows;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_trace::catch_panic::contained;
 use mirrorstats_trace::diagnostic::{Code, Finding};
@@ -22,22 +22,22 @@ const fn most_imported(bytes: u64) -> Limit {
     Limit::in_proportion("rows times columns of a file of its size", 8_000_000, 16, bytes)
 }
 
-pub(super) fn read(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
-    each_batch(file, rows, &|_| false, |batch, rows| rows.add_table(&batch))
+pub(super) fn read(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+    each_batch(file, rows, &[], |batch, rows| rows.add_table(&batch))
 }
 
-/// The rows of a file in batches: its flat columns, and the nested ones that the mapping or `also` reads. The other
+/// The rows of a file in batches: its flat columns, and the nested ones that the mapping or `also` names. The other
 /// nested columns are counted as left out.
 pub(super) fn each_batch(
     file: File,
-    rows: &mut RowSink<'_>,
-    also: &dyn Fn(&str) -> bool,
-    add: impl FnMut(RecordBatch, &mut RowSink<'_>) -> Result<(), ImportError>,
+    rows: &mut Rows<'_>,
+    also: &[&str],
+    add: impl FnMut(RecordBatch, &mut Rows<'_>) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
-    let choose = |root: &Type, count, rows: &mut RowSink<'_>| {
-        let is_wanted = !root.is_group() || also(root.name()) || rows.mapping.reads(root.name());
+    let choose = |root: &Type, count, rows: &mut Rows<'_>| {
+        let is_wanted = !root.is_group() || also.contains(&root.name()) || rows.mapping.reads(root.name());
         if !is_wanted {
-            rows.mapping.leave_out(root.name(), count);
+            rows.notes.leave_out(root.name(), count);
         }
         is_wanted
     };
@@ -47,9 +47,9 @@ pub(super) fn each_batch(
 /// The rows of a file in batches, with the columns that `choose` wants, given their types and the number of rows.
 pub(super) fn each_batch_of(
     mut file: File,
-    rows: &mut RowSink<'_>,
-    choose: impl Fn(&Type, u64, &mut RowSink<'_>) -> bool,
-    mut add: impl FnMut(RecordBatch, &mut RowSink<'_>) -> Result<(), ImportError>,
+    rows: &mut Rows<'_>,
+    choose: impl Fn(&Type, u64, &mut Rows<'_>) -> bool,
+    mut add: impl FnMut(RecordBatch, &mut Rows<'_>) -> Result<(), ImportError>,
 ) -> Result<(), ImportError> {
     let Footer { metadata, chunks, bytes, .. } =
         footer_of(&rows.file, &mut file, Extent::Pages).map_err(|finding| refused(rows, *finding))?;
@@ -87,7 +87,7 @@ fn durations(metadata: &ParquetMetaData) -> Vec<String> {
     durations.map(|field| field.name().clone()).collect()
 }
 
-fn refused(rows: &RowSink<'_>, finding: Finding) -> ImportError {
+fn refused(rows: &Rows<'_>, finding: Finding) -> ImportError {
     let Finding { column, expected, found, help, .. } = finding;
     Fault { file: rows.file.clone(), key: column, ..Fault::new(expected, found, help) }.into()
 }

@@ -5,11 +5,12 @@
 //! depend on a faulty one are skipped without a message.
 
 mod calls;
+mod decimals;
 mod scope;
 mod types;
 mod values;
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use indexmap::IndexMap;
 
@@ -30,12 +31,23 @@ pub(super) struct Bound {
     pub(super) level: Level,
     /// True for a metric with a truth value, which counts as 0 or 1 where a number is needed.
     pub(super) rate: bool,
+    /// The digits after the point of a number that is stored as an integer; 0 for all other values.
+    pub(super) decimals: u8,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct BoundMetric {
+    pub(super) node: NodeId,
+    pub(super) kind: Kind,
+    pub(super) decimals: u8,
+    /// The unit of the columns that its values come from, if that is one unit.
+    pub(super) unit: Option<String>,
 }
 
 #[derive(Debug)]
 pub(super) struct Binding {
     pub(super) plan: Plan,
-    pub(super) metrics: IndexMap<String, (NodeId, Kind)>,
+    pub(super) metrics: IndexMap<String, BoundMetric>,
     pub(super) lets: Vec<(String, NodeId)>,
     pub(super) filter: Option<NodeId>,
 }
@@ -57,7 +69,8 @@ pub(super) fn bind(document: &Document, columns: &Columns, filter: Option<&Writt
         if let Some(bound) = binder.definition(name) {
             let declared = document.metrics[name].said.unit.as_deref() == Some("rate");
             let kind = if bound.rate || declared { Kind::Rate } else { Kind::Quantity };
-            metrics.insert(name.clone(), (bound.node, kind));
+            let (node, decimals) = (bound.node, bound.decimals);
+            metrics.insert(name.clone(), BoundMetric { node, kind, decimals, unit: binder.unit_of(node) });
         }
     }
     let filter = filter.and_then(|written| binder.condition(written, "a filter of episodes"));
@@ -162,14 +175,13 @@ impl Binder<'_> {
             return self.refuse(fault.label("one value per step").help(help));
         }
         match bound.ty {
-            Some(Type::Bool) => {
-                Some(Bound { rate: true, node: self.at_episode(bound), level: Level::Episode, ..bound })
+            Some(ty @ (Type::Bool | Type::Int)) => {
+                Some(Bound { rate: bound.rate || ty == Type::Bool, ..self.at_episode(bound, ty) })
             }
-            Some(Type::Int) => Some(Bound { node: self.at_episode(bound), level: Level::Episode, ..bound }),
             Some(ty @ (Type::Float | Type::Text)) => {
                 let fault =
                     Fault::new(place, format!("a metric is an integer or true or false, this is {}", ty.name()));
-                let help = "sums of integers are exact in any order; compare, count, or scale to an integer column";
+                let help = if ty == Type::Float { decimals::WITHOUT_DECIMALS } else { "compare it, or count steps" };
                 self.refuse(fault.label(ty.name()).help(help))
             }
             None => self.refuse(Fault::new(place, "a metric that is always null is never defined")),
@@ -184,7 +196,7 @@ impl Binder<'_> {
             return self.refuse(fault.label("one value per step").help("wrap it: any(...) or all(...)"));
         }
         match bound.ty {
-            Some(Type::Bool) => Some(Bound { node: self.at_episode(bound), level: Level::Episode, ..bound }),
+            Some(Type::Bool) => Some(self.at_episode(bound, Type::Bool)),
             ty => {
                 let found = ty.map_or("null", Type::name);
                 let fault = Fault::new(place, format!("{what} must be true or false, this is {found}"));
@@ -193,11 +205,32 @@ impl Binder<'_> {
         }
     }
 
-    fn at_episode(&mut self, bound: Bound) -> NodeId {
-        match bound.ty {
-            Some(ty) => self.spread(bound.node, ty, bound.level, Level::Episode),
-            None => bound.node,
+    /// The unit that the columns declare whose values are in this node's value.
+    fn unit_of(&self, node: NodeId) -> Option<String> {
+        let mut units = BTreeSet::new();
+        let (mut seen, mut todo) = (HashSet::new(), vec![node]);
+        while let Some(node) = todo.pop() {
+            if !seen.insert(node) {
+                continue;
+            }
+            match &self.builder.node(node).op {
+                Op::Column(name) => {
+                    units.extend(self.document.columns.get(name).map(|entry| entry.unit.as_str()));
+                }
+                Op::Case { branches, otherwise } => {
+                    todo.extend(branches.iter().map(|(_, value)| *value).chain(*otherwise));
+                }
+                Op::At(value, _) => todo.push(*value),
+                op if self.builder.node(node).ty == Type::Int && !op.counts() => todo.extend(op.operands()),
+                _ => {}
+            }
         }
+        let mut units = units.into_iter().filter(|unit| !unit.is_empty());
+        units.next().filter(|_| units.next().is_none()).map(str::to_owned)
+    }
+
+    fn at_episode(&mut self, bound: Bound, ty: Type) -> Bound {
+        Bound { node: self.spread(bound.node, ty, bound.level, Level::Episode), level: Level::Episode, ..bound }
     }
 
     fn spread(&mut self, node: NodeId, ty: Type, from: Level, to: Level) -> NodeId {

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use super::super::columns::{Column, Fallback, KnownColumn};
 use super::super::functions;
 use super::super::logical_plan::plan::{Arithmetic, Comparison, Constant, NodeId, Op};
-use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
+use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal, complete};
 use super::{Binder, Bound, DEEPEST, State};
 use crate::columns::{Level, Type};
+use crate::file::MOST_DECIMALS;
 use mirrorstats_exact::suggest::nearest;
 use mirrorstats_toml_spec::{Fault, MOST_FAULTS, Place, Source, Written};
 
@@ -39,49 +40,38 @@ impl Scope<'_, '_> {
             }
             ExprKind::Negate(inner) => self.negate(inner),
             ExprKind::Binary(op, left, right) => self.binary(*op, left, right, expr),
-            ExprKind::IsNull { operand, negated } => {
+            ExprKind::IsNull(operand) => {
                 let operand = self.bind(operand)?;
                 let (op, level) = match operand.ty {
                     Some(_) => (Op::IsNull(operand.node), operand.level),
                     None => (Op::Constant(Constant::Bool(true)), Level::Constant),
                 };
-                let is_null = self.unary(op, Type::Bool, level);
-                Some(self.negated_if(*negated, is_null))
+                Some(self.unary(op, Type::Bool, level))
             }
-            ExprKind::IsTruth { operand, truth, negated } => {
+            ExprKind::IsTruth(operand, truth) => {
                 let operand = self.truth(operand)?;
                 let op = if *truth { Op::IsTrue(operand.node) } else { Op::IsFalse(operand.node) };
-                let is = self.unary(op, Type::Bool, operand.level);
-                Some(self.negated_if(*negated, is))
+                Some(self.unary(op, Type::Bool, operand.level))
             }
-            ExprKind::Distinct { left, right, negated } => {
+            ExprKind::Distinct(left, right) => {
                 let (left, right) = self.pair(left, right, expr)?;
-                let distinct = self.combine(&[left, right], Type::Bool, |nodes| Op::Distinct(nodes[0], nodes[1]));
-                Some(self.negated_if(*negated, distinct))
+                Some(self.combine(&[left, right], Type::Bool, |nodes| Op::Distinct(nodes[0], nodes[1])))
             }
-            ExprKind::Between { operand, low, high, negated } => {
+            ExprKind::Between(operand, [low, high]) => {
                 let (operand, low, high) = (self.bind(operand), self.bind(low), self.bind(high));
                 let (operand, low, high) = (operand?, low?, high?);
                 let above = self.compared(Comparison::GreaterEqual, operand, low, expr);
                 let below = self.compared(Comparison::LessEqual, operand, high, expr);
-                let between = self.combine(&[above?, below?], Type::Bool, |nodes| Op::And(nodes[0], nodes[1]));
-                Some(self.negated_if(*negated, between))
+                Some(self.combine(&[above?, below?], Type::Bool, |nodes| Op::And(nodes[0], nodes[1])))
             }
-            ExprKind::InList { operand: asked, list, negated } => {
-                let operand = self.bind(asked);
-                let items: Vec<_> = list.iter().map(|item| self.bind(item)).collect();
-                let (operand, items) = (operand?, items.into_iter().collect::<Option<Vec<Bound>>>()?);
-                let checked: Vec<_> = (items.iter().zip(list))
-                    .map(|(item, written)| self.check_equality((operand, asked), (*item, written)))
-                    .collect();
-                checked.into_iter().collect::<Option<()>>()?;
-                let equal: Vec<_> =
-                    items.into_iter().map(|item| self.compared(Comparison::Equal, operand, item, expr)).collect();
-                let equal: Vec<Bound> = equal.into_iter().collect::<Option<_>>()?;
-                let either =
-                    |this: &mut Self, a: Bound, b: Bound| this.combine(&[a, b], Type::Bool, |n| Op::Or(n[0], n[1]));
-                let found = equal.into_iter().reduce(|a, b| either(self, a, b))?;
-                Some(self.negated_if(*negated, found))
+            ExprKind::InList(asked, list) => {
+                let (operand, items) = (self.bind(asked), complete(list.iter().map(|item| self.bind(item))));
+                let (operand, items) = (operand?, items?);
+                let pairs = items.iter().zip(list);
+                complete(pairs.map(|(item, written)| self.check_equality((operand, asked), (*item, written))))?;
+                let equal = items.into_iter().map(|item| self.compared(Comparison::Equal, operand, item, expr));
+                let equal = complete(equal)?.into_iter();
+                equal.reduce(|a, b| self.combine(&[a, b], Type::Bool, |n| Op::Or(n[0], n[1])))
             }
             ExprKind::Case { operand, branches, otherwise } => {
                 self.case(operand.as_deref(), branches, otherwise.as_deref(), expr)
@@ -101,13 +91,14 @@ impl Scope<'_, '_> {
         if name == "t" {
             return Some(self.unary(Op::Time, Type::Int, Level::Step));
         }
-        let Some(&KnownColumn { column, fallback, .. }) = binder.columns.known(name) else {
+        let Some(&KnownColumn { column, fallback, decimals, .. }) = binder.columns.known(name) else {
             return self.unknown_name(name, expr);
         };
-        match fallback {
-            None => Some(self.unary(Op::Column(name.to_owned()), column.ty, column.level)),
-            Some(fallback) => self.column_or(name, column, fallback),
-        }
+        let bound = match fallback {
+            None => self.unary(Op::Column(name.to_owned()), column.ty, column.level),
+            Some(fallback) => self.column_or(name, column, fallback)?,
+        };
+        Some(decimals.filter(|_| bound.ty == Some(Type::Float)).map_or(bound, |digits| self.rounded(bound, digits)))
     }
 
     fn column_or(&mut self, name: &str, column: Column, fallback: Fallback) -> Option<Bound> {
@@ -153,15 +144,14 @@ impl Scope<'_, '_> {
     }
 
     pub(super) fn negate(&mut self, inner: &Expr) -> Option<Bound> {
-        if let ExprKind::Literal(Literal::Int(value)) = inner.kind {
-            return Some(self.literal(&Literal::Int(-value)));
-        }
-        if let ExprKind::Literal(Literal::Float(value)) = inner.kind {
-            return Some(self.literal(&Literal::Float(-value)));
+        match inner.kind {
+            ExprKind::Literal(Literal::Int(value)) => return Some(self.literal(&Literal::Int(-value))),
+            ExprKind::Literal(Literal::Float(value)) => return Some(self.literal(&Literal::Float(-value))),
+            _ => {}
         }
         let inner = self.number(inner)?;
         let ty = inner.ty?;
-        Some(self.unary(Op::Negate(inner.node), ty, inner.level))
+        Some(Bound { decimals: inner.decimals, ..self.unary(Op::Negate(inner.node), ty, inner.level) })
     }
 
     fn binary(&mut self, op: BinaryOp, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {
@@ -213,32 +203,42 @@ impl Scope<'_, '_> {
         let Op::Case { branches, otherwise: Some(otherwise) } = &self.binder.builder.node(left.node).op else {
             return None;
         };
-        let ([(when, then)], otherwise) = (branches.as_slice(), *otherwise) else { return None };
-        let (when, then) = (*when, *then);
+        let (&[(when, then)], otherwise) = (branches.as_slice(), *otherwise) else { return None };
         let text = |node: NodeId| self.binder.literal_text(node);
         let wanted = text(right.node)?;
-        let equal = (text(then)? == wanted, text(otherwise)? == wanted);
-        let is_true = || Op::IsTrue(when);
-        match (comparison, equal) {
-            (Comparison::Equal, (true, false)) | (Comparison::NotEqual, (false, true)) => {
-                Some(self.unary(is_true(), Type::Bool, left.level))
-            }
-            (Comparison::Equal, (false, true)) | (Comparison::NotEqual, (true, false)) => {
-                let is = self.unary(is_true(), Type::Bool, left.level);
-                Some(self.negated_if(true, is))
-            }
-            _ => None,
-        }
+        let is_met = match (comparison, text(then)? == wanted, text(otherwise)? == wanted) {
+            (Comparison::Equal, true, false) | (Comparison::NotEqual, false, true) => true,
+            (Comparison::Equal, false, true) | (Comparison::NotEqual, true, false) => false,
+            _ => return None,
+        };
+        let is = self.unary(Op::IsTrue(when), Type::Bool, left.level);
+        Some(if is_met { is } else { self.unary(Op::Not(is.node), Type::Bool, is.level) })
     }
 
     pub(super) fn arithmetic(&mut self, op: Arithmetic, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {
         let (a, b) = (self.number(left), self.number(right));
-        let (both, ty) = self.unified(&[a?, b?], whole, "combined")?;
+        let both = [a?, b?];
+        // The digits of a product are those of both factors.
+        let (both, ty) = if op == Arithmetic::Multiply && both.iter().any(|factor| factor.decimals > 0) {
+            (self.as_decimals(&both, whole)?, Type::Int)
+        } else {
+            self.unified(&both, whole, "combined")?
+        };
         if ty == Type::Float && matches!(op, Arithmetic::Quotient | Arithmetic::Remainder) {
             let fault = Fault::new(self.place(whole), "division is for integers");
             return self.binder.refuse(fault.label("a float"));
         }
-        Some(self.combine(&both, ty, |n| Op::Arithmetic(op, n[0], n[1])))
+        let decimals = match op {
+            Arithmetic::Multiply => both[0].decimals + both[1].decimals,
+            Arithmetic::Quotient => 0,
+            _ => both[0].decimals,
+        };
+        if decimals > MOST_DECIMALS {
+            let fault = Fault::new(self.place(whole), format!("the product has {decimals} digits after the point"));
+            let help = format!("round its factors: at most {MOST_DECIMALS} digits are exact");
+            return self.binder.refuse(fault.help(help));
+        }
+        Some(Bound { decimals, ..self.combine(&both, ty, |n| Op::Arithmetic(op, n[0], n[1])) })
     }
 
     pub(super) fn case(
@@ -249,27 +249,17 @@ impl Scope<'_, '_> {
         whole: &Expr,
     ) -> Option<Bound> {
         let operand = operand.map(|operand| (self.bind(operand), operand));
-        let whens: Vec<Option<Bound>> = branches
-            .iter()
-            .map(|(when, _)| match operand {
-                Some((operand, asked)) => {
-                    let bound = self.bind(when);
-                    let (operand, bound) = (operand?, bound?);
-                    self.check_equality((operand, asked), (bound, when))?;
-                    self.compared(Comparison::Equal, operand, bound, when)
-                }
-                None => self.truth(when),
-            })
-            .collect();
-        let thens: Vec<Option<Bound>> = branches.iter().map(|(_, then)| self.bind(then)).collect();
-        let otherwise = otherwise.map(|expr| self.bind(expr));
-        let whens: Vec<Bound> = whens.into_iter().collect::<Option<_>>()?;
-        let mut values: Vec<Bound> = thens.into_iter().collect::<Option<_>>()?;
-        let has_otherwise = otherwise.is_some();
-        values.extend(otherwise.unwrap_or(None).map_or_else(Vec::new, |bound| vec![bound]));
-        if has_otherwise && values.len() == whens.len() {
-            return None;
-        }
+        let whens = complete(branches.iter().map(|(when, _)| match operand {
+            Some((operand, asked)) => {
+                let bound = self.bind(when);
+                let (operand, bound) = (operand?, bound?);
+                self.check_equality((operand, asked), (bound, when))?;
+                self.compared(Comparison::Equal, operand, bound, when)
+            }
+            None => self.truth(when),
+        }));
+        let values = complete(branches.iter().map(|(_, then)| then).chain(otherwise).map(|value| self.bind(value)));
+        let (whens, values) = (whens?, values?);
         let all_rates = values.iter().all(|value| value.rate || value.ty.is_none());
         let (values, ty) = self.unified(&values, whole, "results of one `case`")?;
         let operands: Vec<Bound> = whens.iter().chain(&values).copied().collect();
@@ -281,7 +271,7 @@ impl Scope<'_, '_> {
                 otherwise: values.get(branch_count).copied(),
             }
         });
-        Some(Bound { rate: all_rates && ty == Type::Bool, ..bound })
+        Some(Bound { rate: all_rates && ty == Type::Bool, decimals: values[0].decimals, ..bound })
     }
 
     pub(super) fn place(&self, expr: &Expr) -> Place {

@@ -17,7 +17,7 @@ impl Scope<'_, '_> {
             Literal::Text(value) => (Constant::Text(value.clone()), Some(Type::Text)),
         };
         let node = self.binder.builder.add(Op::Constant(constant), ty.unwrap_or(Type::Bool), Level::Constant);
-        Bound { node, ty, level: Level::Constant, rate: false }
+        Bound { node, ty, level: Level::Constant, rate: false, decimals: 0 }
     }
 
     pub(super) fn unary(&mut self, op: Op, ty: Type, level: Level) -> Bound {
@@ -33,7 +33,7 @@ impl Scope<'_, '_> {
             }
             (level, op) => (op, level),
         };
-        Bound { node: self.binder.builder.add(op, ty, level), ty: Some(ty), level, rate: false }
+        Bound { node: self.binder.builder.add(op, ty, level), ty: Some(ty), level, rate: false, decimals: 0 }
     }
 
     pub(super) fn combine(&mut self, operands: &[Bound], ty: Type, op: impl FnOnce(&[NodeId]) -> Op) -> Bound {
@@ -50,11 +50,7 @@ impl Scope<'_, '_> {
                 }
             })
             .collect();
-        Bound { node: self.binder.builder.add(op(&nodes), ty, level), ty: Some(ty), level, rate: false }
-    }
-
-    pub(super) fn negated_if(&mut self, negated: bool, bound: Bound) -> Bound {
-        if negated { self.unary(Op::Not(bound.node), Type::Bool, bound.level) } else { bound }
+        Bound { node: self.binder.builder.add(op(&nodes), ty, level), ty: Some(ty), level, rate: false, decimals: 0 }
     }
 
     pub(super) fn truth(&mut self, expr: &Expr) -> Option<Bound> {
@@ -89,16 +85,16 @@ impl Scope<'_, '_> {
 
     pub(super) fn null_of(&mut self, ty: Type) -> Bound {
         let node = self.binder.builder.add(Op::Constant(Constant::Null), ty, Level::Constant);
-        Bound { node, ty: Some(ty), level: Level::Constant, rate: false }
+        Bound { node, ty: Some(ty), level: Level::Constant, rate: false, decimals: 0 }
     }
 
-    fn as_int(&mut self, bound: Bound) -> Bound {
+    pub(super) fn as_int(&mut self, bound: Bound) -> Bound {
         self.unary(Op::IntFromBool(bound.node), Type::Int, bound.level)
     }
 
     fn converted(&mut self, bound: Bound, ty: Type) -> Option<Bound> {
         match (bound.ty, ty) {
-            (None, ty) => Some(self.null_of(ty)),
+            (None, ty) => Some(Bound { decimals: bound.decimals, ..self.null_of(ty) }),
             (Some(from), to) if from == to => Some(bound),
             (Some(Type::Bool), Type::Int) if bound.rate => Some(self.as_int(bound)),
             (Some(Type::Bool), Type::Float) if bound.rate => {
@@ -130,6 +126,7 @@ impl Scope<'_, '_> {
 
     /// Converts operands to one type; `what` describes the operation in the message.
     pub(super) fn unified(&mut self, bounds: &[Bound], expr: &Expr, what: &str) -> Option<(Vec<Bound>, Type)> {
+        let bounds = &self.aligned(bounds, expr)?;
         let Some(ty) = Self::common_type(bounds) else {
             let mut names: Vec<&str> = bounds.iter().filter_map(|bound| bound.ty.map(Type::name)).collect();
             names.dedup();

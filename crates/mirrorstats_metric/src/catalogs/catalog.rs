@@ -10,7 +10,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use crate::catalogs::measure::{Measures, ValueRange};
+use crate::columns::Type;
+use mirrorstats_exact::chance::Chance;
+use mirrorstats_exact::moments::Moments;
 pub use mirrorstats_exact::moments::StandardError;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_exact::ratio::Ratio;
 
 /// A resolved definition file: its includes merged, in the order of definition.
@@ -28,6 +32,9 @@ pub struct Catalog {
     /// Named expressions, as written.
     #[serde(rename = "let")]
     pub lets: IndexMap<String, String>,
+    /// The columns with decimals by name: metrics of their values depend on them.
+    #[serde(default, rename = "column", skip_serializing_if = "IndexMap::is_empty")]
+    pub columns: IndexMap<String, DecimalColumn>,
     /// The metrics by name, in the order of definition.
     pub metric: IndexMap<String, Metric>,
     /// The known experiments by name, ordered by `order`, then name: those of the definitions, and those that the traces
@@ -45,15 +52,32 @@ impl Catalog {
     }
 }
 
+/// A column of floats that are rounded to some digits after the point.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct DecimalColumn {
+    /// Always a float.
+    #[serde(rename = "type")]
+    pub ty: Type,
+    /// True if it is constant in an episode.
+    pub constant: bool,
+    /// Digits after the point.
+    pub decimals: u8,
+    /// The unit; empty without one.
+    pub unit: String,
+}
+
 /// One metric, as defined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Metric {
     /// The full name, "Mirror Consultation Rate".
     pub title: String,
-    /// A rate (0/1 an episode) or a quantity (an integer an episode).
+    /// A rate (0 or 1 for each episode) or a quantity (a number for each episode).
     pub kind: Kind,
     /// The unit: `rate`, `steps`, `permille`, ...
     pub unit: String,
+    /// The digits after the point of its values. Stored values are integers: 33.18 with two decimals is 3318.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub decimals: u8,
     /// The better direction.
     pub better: Better,
     /// The section of the paper that defines it; empty without one.
@@ -80,6 +104,40 @@ pub struct Metric {
     /// The rate that counts unfinished episodes as failures; this one is the same among finished ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub completes: Option<String>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+const fn is_zero(decimals: &u8) -> bool {
+    *decimals == 0
+}
+
+impl Metric {
+    /// The stored integer for one unit: 100 for two decimals, 1 for whole numbers.
+    pub fn scale(&self) -> i64 {
+        10_i64.pow(self.decimals.into())
+    }
+
+    /// A stored value, or a mean of stored values, in the metric's unit.
+    #[expect(clippy::cast_precision_loss, reason = "at most 10^9")]
+    pub fn in_unit(&self, stored: f64) -> f64 {
+        stored / self.scale() as f64
+    }
+
+    /// The sum of stored values and the sum of their squares in the metric's unit, exactly.
+    pub fn sums(&self, moments: &Moments) -> [Decimal; 2] {
+        let digits = u32::from(self.decimals);
+        [Decimal::of_units(moments.sum, digits), Decimal::of_units(moments.sum_sq, 2 * digits)]
+    }
+
+    /// The mean in the metric's unit; `None` without values.
+    pub fn mean(&self, moments: &Moments) -> Option<f64> {
+        moments.mean().map(|mean| self.in_unit(mean))
+    }
+
+    /// The standard error that the definition asks for, in the metric's unit; `None` if it is undefined.
+    pub fn standard_error(&self, moments: &Moments) -> Option<f64> {
+        moments.se(self.se).map(|se| self.in_unit(se))
+    }
 }
 
 /// The meaning of an episode's integer.
@@ -133,7 +191,7 @@ pub struct Experiment {
     /// Position among the experiments; the greatest number where the traces declare it without one.
     pub order: i64,
     /// Chance levels by metric; `None` says that the metric has none in this experiment.
-    pub chance: IndexMap<String, Option<Ratio>>,
+    pub chance: IndexMap<String, Option<Chance>>,
     /// Reference levels by metric: what some blind strategies would reach, where no chance level applies.
     pub reference: IndexMap<String, Vec<Ratio>>,
     /// True if the traces declare it, and the definitions do not know it; then the hash of the definitions is without it.
@@ -185,13 +243,16 @@ pub(crate) fn by_order(a: &String, one: &Experiment, b: &String, other: &Experim
 }
 
 impl Catalog {
-    /// The value of blind guessing at `metric` in `experiment`, if there is one (paper, Chance baselines).
+    /// The value of the best blind strategy at `metric` in `experiment`, if there is one (paper, Chance baselines).
     pub fn chance(&self, experiment: &str, metric: &str) -> Option<Ratio> {
-        let own = self.experiment.get(experiment).and_then(|e| e.chance.get(metric));
-        match own {
-            Some(level) => *level,
-            None => self.metric.get(metric).and_then(|m| m.chance),
-        }
+        self.levels(experiment, metric).last().map(|(_, level)| *level)
+    }
+
+    /// The values of all blind strategies, from the lowest to the highest.
+    pub fn levels(&self, experiment: &str, metric: &str) -> Vec<(Option<String>, Ratio)> {
+        let own = self.experiment.get(experiment).and_then(|e| e.chance.get(metric)).cloned();
+        let level = own.unwrap_or_else(|| self.metric.get(metric).and_then(|m| m.chance).map(Chance::Of));
+        level.map(|chance| chance.levels()).unwrap_or_default()
     }
 
     /// Adds experiments that the traces declare, except those with a known name.

@@ -56,8 +56,11 @@ impl Metric {
         }
     }
 
+    /// The possible values, as stored: in units of the last digit.
     pub fn value_range(&self) -> ValueRange {
-        let range = range(self.measures, self.range, &self.unit);
+        let ValueRange { least, most } = range(self.measures, self.range, &self.unit);
+        let stored = |bound: Option<i64>| bound.and_then(|bound| bound.checked_mul(self.scale()));
+        let range = ValueRange { least: stored(least), most: stored(most) };
         match self.measures() {
             Some(Measures::Rate) => ValueRange { least: Some(0), most: Some(1) },
             Some(Measures::Duration | Measures::Count) => ValueRange { least: range.least.or(Some(0)), ..range },

@@ -79,9 +79,10 @@ impl RelationReader<'_> {
         let others = of_whole.when.as_ref().and_then(|when| parse(when).ok());
         let others = others.as_ref().map_or_else(Vec::new, conditions);
         let own: Vec<&Expr> = conditions(&when).into_iter().filter(|condition| !others.contains(condition)).collect();
-        let [Expr { kind: ExprKind::IsNull { operand, negated: true }, .. }] = own.as_slice() else { return None };
-        let is_failure = self.of_text(operand, &of_whole.value, DEEPEST) == Without::False;
-        is_failure.then(|| Completed { name: name.to_owned(), whole, moment: (**operand).clone() })
+        let [condition] = own.as_slice() else { return None };
+        let moment = not_null(condition)?;
+        let is_failure = self.of_text(moment, &of_whole.value, DEEPEST) == Without::False;
+        is_failure.then(|| Completed { name: name.to_owned(), whole, moment: moment.clone() })
     }
 
     fn finished(&self, duration: &Metric, moments: &[Completed]) -> Option<String> {
@@ -110,7 +111,7 @@ impl RelationReader<'_> {
             _ if expr == moment => Without::Null,
             ExprKind::Name(name) => self.of_name(moment, name, depth),
             ExprKind::Literal(Literal::Bool(false) | Literal::Int(0)) => Without::False,
-            ExprKind::IsNull { operand, negated: true } if is_null(operand) => Without::False,
+            _ if not_null(expr).is_some_and(is_null) => Without::False,
             ExprKind::Binary(BinaryOp::And, x, y) => match (of(x), of(y)) {
                 (Without::False, _) | (_, Without::False) => Without::False,
                 (Without::Open, Without::Open) => Without::Open,
@@ -139,6 +140,12 @@ impl RelationReader<'_> {
             _ => Without::Open,
         }
     }
+}
+
+/// The moment in `moment is not null`.
+fn not_null(expr: &Expr) -> Option<&Expr> {
+    let ExprKind::Not(inner) = &expr.kind else { return None };
+    if let ExprKind::IsNull(moment) = &inner.kind { Some(moment) } else { None }
 }
 
 fn conditions(expr: &Expr) -> Vec<&Expr> {

@@ -41,12 +41,16 @@ impl Definitions {
         let column = |(name, entry): (&str, &ColumnEntry)| {
             let is_constant = entry.column.level == Level::Episode;
             let shape = json!({ "type": entry.column.ty, "constant": is_constant, "values": entry.values,
-                "unit": entry.unit, "help": entry.help });
+                "unit": entry.unit, "decimals": entry.decimals, "help": entry.help });
             (name.to_owned(), shape)
         };
         let columns: Map<String, Value> = self.declared_columns().map(column).collect();
-        let columns = if columns.is_empty() { String::new() } else { text(&json!({ "column": columns })) };
-        format!("{}\n{columns}", as_file(&self.catalog))
+        let mut root = file_of(&self.catalog);
+        if !columns.is_empty() {
+            root["column"] = columns.into();
+            drop_nulls(&mut root);
+        }
+        text(&root)
     }
 }
 
@@ -55,10 +59,14 @@ fn text(root: &Value) -> String {
 }
 
 fn as_file(catalog: &Catalog) -> String {
+    text(&file_of(catalog))
+}
+
+fn file_of(catalog: &Catalog) -> Value {
     let mut root = serde_json::json!(catalog.without_declared());
     drop_keys(&mut root, &["name", "hash"]);
     for metric in entries(&mut root, "metric") {
-        drop_keys(metric, &["kind"]);
+        drop_keys(metric, &["kind", "decimals"]);
     }
     for experiment in entries(&mut root, "experiment") {
         for level in entries(experiment, "chance").filter(|level| level.is_null()) {
@@ -66,7 +74,7 @@ fn as_file(catalog: &Catalog) -> String {
         }
     }
     drop_nulls(&mut root);
-    text(&root)
+    root
 }
 
 fn entries<'v>(value: &'v mut Value, key: &str) -> impl Iterator<Item = &'v mut Value> {

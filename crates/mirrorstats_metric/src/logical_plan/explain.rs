@@ -136,27 +136,10 @@ fn condition(expr: &Expr) -> String {
         ExprKind::Name(name) => format!("{name} holds"),
         ExprKind::Literal(Literal::Bool(true)) => "always".to_owned(),
         ExprKind::Literal(Literal::Bool(false)) => "never".to_owned(),
-        ExprKind::Not(x) => format!("not ({})", condition(x)),
+        ExprKind::Not(x) => tested(x, true).unwrap_or_else(|| format!("not ({})", condition(x))),
         ExprKind::Binary(BinaryOp::And, x, y) => format!("{} and {}", part(x), part(y)),
         ExprKind::Binary(BinaryOp::Or, x, y) => format!("{} or {}", part(x), part(y)),
         ExprKind::Binary(op, x, y) => format!("{} {} {}", value(x), relation(*op, x), value(y)),
-        ExprKind::IsNull { operand, negated: false } => format!("there is no {}", value(operand)),
-        ExprKind::IsNull { operand, negated: true } => format!("there is a {}", value(operand)),
-        ExprKind::IsTruth { operand, truth, negated } => {
-            format!("it is {}{truth} that {}", if *negated { "not " } else { "" }, part(operand))
-        }
-        ExprKind::Distinct { left, right, negated } => {
-            let relation = if *negated { "is the same as" } else { "is another than" };
-            format!("{} {relation} {} (nulls alike)", value(left), value(right))
-        }
-        ExprKind::Between { operand, low, high, negated } => {
-            let not = if *negated { "not " } else { "" };
-            format!("{} is {not}from {} to {}", value(operand), value(low), value(high))
-        }
-        ExprKind::InList { operand, list, negated } => {
-            let relation = if *negated { "is none of" } else { "is one of" };
-            format!("{} {relation} {}", value(operand), list.iter().map(value).collect::<Vec<_>>().join(", "))
-        }
         ExprKind::Call { name, arguments } => match (name.as_str(), arguments.as_slice()) {
             ("any", [p]) => format!("at some step {}", part(p)),
             ("all", [p]) => format!("at every step {}", part(p)),
@@ -171,8 +154,27 @@ fn condition(expr: &Expr) -> String {
             ("regexp_like", [text, pattern]) => format!("{} has a match of {}", value(text), value(pattern)),
             _ => value(expr),
         },
-        _ => value(expr),
+        _ => tested(expr, false).unwrap_or_else(|| value(expr)),
     }
+}
+
+/// The tests that have words of their own with `not`.
+fn tested(expr: &Expr, negated: bool) -> Option<String> {
+    let either = |positive: &'static str, negative: &'static str| if negated { negative } else { positive };
+    let not = either("", "not ");
+    Some(match &expr.kind {
+        ExprKind::IsNull(x) => format!("there is {} {}", either("no", "a"), value(x)),
+        ExprKind::IsTruth(x, truth) => format!("it is {not}{truth} that {}", part(x)),
+        ExprKind::Distinct(x, y) => {
+            format!("{} {} {} (nulls alike)", value(x), either("is another than", "is the same as"), value(y))
+        }
+        ExprKind::Between(x, [low, high]) => format!("{} is {not}from {} to {}", value(x), value(low), value(high)),
+        ExprKind::InList(x, list) => {
+            let list: Vec<String> = list.iter().map(value).collect();
+            format!("{} {} {}", value(x), either("is one of", "is none of"), list.join(", "))
+        }
+        _ => return None,
+    })
 }
 
 /// A condition within another, in parentheses if it would be misread without.
@@ -184,20 +186,16 @@ fn part(expr: &Expr) -> String {
 
 fn relation(op: BinaryOp, left: &Expr) -> String {
     let BinaryOp::Compare(comparison) = op else { return op.to_string() };
-    let time = left.kind == ExprKind::Name("t".to_owned());
-    let words = match (comparison, time) {
-        (Comparison::Equal, _) => "is",
-        (Comparison::NotEqual, _) => "is not",
-        (Comparison::Less, true) => "is before",
-        (Comparison::Less, false) => "is less than",
-        (Comparison::LessEqual, true) => "is not after",
-        (Comparison::LessEqual, false) => "is at most",
-        (Comparison::Greater, true) => "is after",
-        (Comparison::Greater, false) => "is more than",
-        (Comparison::GreaterEqual, true) => "is not before",
-        (Comparison::GreaterEqual, false) => "is at least",
+    let [of_number, of_time] = match comparison {
+        Comparison::Equal => ["is"; 2],
+        Comparison::NotEqual => ["is not"; 2],
+        Comparison::Less => ["is less than", "is before"],
+        Comparison::LessEqual => ["is at most", "is not after"],
+        Comparison::Greater => ["is more than", "is after"],
+        Comparison::GreaterEqual => ["is at least", "is not before"],
     };
-    words.to_owned()
+    let is_time = matches!(&left.kind, ExprKind::Name(name) if name == "t");
+    if is_time { of_time } else { of_number }.to_owned()
 }
 
 fn value(expr: &Expr) -> String {
@@ -211,16 +209,7 @@ fn value(expr: &Expr) -> String {
             Literal::Text(value) => format!("'{value}'"),
         },
         ExprKind::Negate(x) => format!("minus {}", value(x)),
-        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Add), x, y) => format!("{} plus {}", value(x), value(y)),
-        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Subtract), x, y) => {
-            format!("{} minus {}", value(x), value(y))
-        }
-        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Multiply), x, y) => {
-            format!("{} times {}", value(x), value(y))
-        }
-        ExprKind::Binary(BinaryOp::Arithmetic(Arithmetic::Remainder), x, y) => {
-            format!("the remainder of {} by {}", value(x), value(y))
-        }
+        ExprKind::Binary(BinaryOp::Arithmetic(op), x, y) => arithmetic(*op, &value(x), &value(y)),
         ExprKind::Case { operand, branches, otherwise } => {
             let test = |at: usize, when: &Expr| match (operand, at) {
                 (Some(operand), 0) => format!("{} is {}", value(operand), value(when)),
@@ -238,6 +227,16 @@ fn value(expr: &Expr) -> String {
     }
 }
 
+fn arithmetic(op: Arithmetic, x: &str, y: &str) -> String {
+    match op {
+        Arithmetic::Add => format!("{x} plus {y}"),
+        Arithmetic::Subtract => format!("{x} minus {y}"),
+        Arithmetic::Multiply => format!("{x} times {y}"),
+        Arithmetic::Quotient => format!("({x}) divided by ({y}), the fraction dropped"),
+        Arithmetic::Remainder => format!("the remainder of {x} by {y}"),
+    }
+}
+
 fn call(name: &str, arguments: &[Expr], expr: &Expr) -> String {
     match (name, arguments) {
         ("first", [p]) => format!("the first step where {}", condition(p)),
@@ -246,12 +245,14 @@ fn call(name: &str, arguments: &[Expr], expr: &Expr) -> String {
         ("length", []) => "the number of steps".to_owned(),
         ("min", [x]) => format!("the smallest {} of the steps", value(x)),
         ("max", [x]) => format!("the largest {} of the steps", value(x)),
+        ("mean", [x]) => format!("the mean of {} over the steps", value(x)),
+        ("round", [x, digits]) => format!("{} rounded to {} digits after the point", value(x), value(digits)),
         ("sum", [x]) => format!("the sum of {} over the steps", value(x)),
         ("at", [x, moment]) => format!("{} at step {}", value(x), value(moment)),
         ("lag", [x]) => format!("{} at the step before", value(x)),
         ("coalesce", values) => values.iter().map(value).collect::<Vec<_>>().join(", or else "),
         ("nullif", [x, y]) => format!("{} unless it is {}", value(x), value(y)),
-        ("div", [x, y]) => format!("({}) divided by ({}), the fraction dropped", value(x), value(y)),
+        ("div", [x, y]) => arithmetic(Arithmetic::Quotient, &value(x), &value(y)),
         _ => format!("whether {}", condition(expr)),
     }
 }

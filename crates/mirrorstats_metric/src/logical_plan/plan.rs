@@ -66,6 +66,9 @@ pub enum Op {
     /// 1 for true, 0 for false.
     IntFromBool(NodeId),
     FloatFromInt(NodeId),
+    /// A float times this power of ten, rounded to an integer, halves away from zero. Other than finite values below
+    /// 2^53 are errors.
+    Scale(NodeId, u8),
     Aggregate(Aggregate, NodeId),
     /// The value of the first operand at the timestep in the second; null if that step does not exist.
     At(NodeId, NodeId),
@@ -162,6 +165,8 @@ mirrorstats_exact::names!(Arithmetic { Add: "+", Subtract: "-", Multiply: "*", Q
 pub struct Output {
     pub name: String,
     pub kind: Kind,
+    /// The digits after the point of its values, which are integers in units of the last digit.
+    pub decimals: u8,
     /// Its value per episode: a truth value for most rates, else an integer.
     pub node: NodeId,
 }
@@ -219,6 +224,14 @@ impl Plan {
 }
 
 impl Op {
+    /// Returns true if the result is a number of steps or a timestep, not a value of steps.
+    pub(crate) const fn counts(&self) -> bool {
+        matches!(
+            self,
+            Self::Length | Self::Time | Self::Aggregate(Aggregate::First | Aggregate::Last | Aggregate::Count, _)
+        )
+    }
+
     pub fn operands(&self) -> Vec<NodeId> {
         let mut operands = Vec::new();
         let _ = self.with_operands(|operand| {
@@ -251,6 +264,7 @@ impl Op {
             Self::Matches(x, pattern) => Self::Matches(to(*x), pattern.clone()),
             Self::IntFromBool(x) => Self::IntFromBool(to(*x)),
             Self::FloatFromInt(x) => Self::FloatFromInt(to(*x)),
+            Self::Scale(x, decimals) => Self::Scale(to(*x), *decimals),
             Self::Aggregate(aggregate, x) => Self::Aggregate(*aggregate, to(*x)),
             Self::At(x, moment) => Self::At(to(*x), to(*moment)),
             Self::Lag(x) => Self::Lag(to(*x)),

@@ -10,13 +10,14 @@ use crate::logical_plan::plan::{Arithmetic, Constant};
 pub enum Dialect {
     #[default]
     Portable,
-    /// Spark SQL.
     Spark,
     Duckdb,
 }
 
-/// The functions of a dialect that save a pass over the steps.
+/// Functions that the portable form lacks.
 pub(super) struct Functions {
+    pub(super) matches: &'static str,
+    pub(super) any_value: &'static str,
     /// The value at the smallest and at the largest non-null t; the value may be null.
     pub(super) value_at: [&'static str; 2],
     pub(super) of_list: [&'static str; 3],
@@ -41,31 +42,26 @@ impl Dialect {
         }
     }
 
-    pub(super) const fn matches(self) -> Option<&'static str> {
-        match self {
-            Self::Portable => None,
-            Self::Spark => Some("regexp_like"),
-            Self::Duckdb => Some("regexp_matches"),
-        }
-    }
-
     pub(super) const fn functions(self) -> Option<Functions> {
         match self {
             Self::Portable => None,
-            Self::Spark => {
-                Some(Functions { value_at: ["min_by", "max_by"], of_list: ["size", "array_min", "array_max"] })
-            }
-            Self::Duckdb => {
-                Some(Functions { value_at: ["arg_min_null", "arg_max_null"], of_list: ["len", "list_min", "list_max"] })
-            }
+            Self::Spark => Some(Functions {
+                matches: "regexp_like",
+                any_value: "MIN",
+                value_at: ["min_by", "max_by"],
+                of_list: ["size", "array_min", "array_max"],
+            }),
+            Self::Duckdb => Some(Functions {
+                matches: "regexp_matches",
+                any_value: "any_value",
+                value_at: ["arg_min_null", "arg_max_null"],
+                of_list: ["len", "list_min", "list_max"],
+            }),
         }
     }
 
-    pub(super) const fn any_value(self) -> &'static str {
-        match self {
-            Self::Duckdb => "any_value",
-            Self::Portable | Self::Spark => "MIN",
-        }
+    pub(super) fn any_value(self) -> &'static str {
+        self.functions().map_or("MIN", |functions| functions.any_value)
     }
 
     pub(super) fn list(self, condition: &str) -> String {

@@ -119,6 +119,13 @@ impl Layout<'_> {
             Op::IntFromBool(x) if self.dialect == Dialect::Spark => wide(&self.truth_as_int(*x)),
             Op::IntFromBool(x) => self.truth_as_int(*x),
             Op::FloatFromInt(x) => format!("CAST({} AS DOUBLE)", self.value(*x)),
+            Op::Scale(x, decimals) => {
+                // FLOOR means the same in all engines; they disagree on how ROUND rounds a half.
+                let scaled = format!("{} * CAST(1e{decimals} AS DOUBLE)", self.value(*x));
+                let up = format!("FLOOR({scaled} + CAST(0.5 AS DOUBLE))");
+                let down = format!("0 - FLOOR(CAST(0.5 AS DOUBLE) - {scaled})");
+                wide(&format!("CASE WHEN {} < 0 THEN {down} ELSE {up} END", self.value(*x)))
+            }
             Op::Case { branches, otherwise } => self.case(branches, *otherwise, |id| self.value(id)),
             Op::Coalesce(values) => coalesce(values.iter().map(|&id| self.value(id))),
             _ => self.searched(id).unwrap_or_else(|| self.truth_as_int(id)),
@@ -228,7 +235,7 @@ impl Layout<'_> {
             }
             Op::IsNull(x) => format!("({} IS NULL)", self.operand(*x)),
             Op::Matches(x, pattern) => {
-                let function = self.dialect.matches().unwrap_or("regexp_like");
+                let function = self.dialect.functions().map_or("regexp_like", |functions| functions.matches);
                 format!("{function}({}, {})", self.value(*x), self.dialect.pattern(pattern))
             }
             _ => format!("({} = 1)", self.truth_as_int(id)),
@@ -265,7 +272,6 @@ fn coalesce(values: impl Iterator<Item = String>) -> String {
     format!("COALESCE({})", values.collect::<Vec<_>>().join(", "))
 }
 
-/// An integer of 64 bits.
 fn wide(value: &str) -> String {
     format!("CAST({value} AS BIGINT)")
 }

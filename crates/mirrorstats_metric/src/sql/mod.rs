@@ -38,7 +38,6 @@ use super::logical_plan::plan::{NodeId, Op, Plan};
 
 use mirrorstats_exact::budget::SETTING;
 
-/// The error for a plan that a dialect cannot express.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoweringError {
     #[error("`{metric}` uses regexp_like, which has no form that all engines share; choose --dialect spark or duckdb")]
@@ -68,7 +67,7 @@ pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
 }
 
 fn check_patterns(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
-    if dialect.matches().is_some() {
+    if dialect.functions().is_some() {
         return Ok(());
     }
     let uses = |root: NodeId| plan.needed_by([root]).into_iter().any(|id| matches!(plan.node(id).op, Op::Matches(..)));

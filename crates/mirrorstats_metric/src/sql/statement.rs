@@ -122,6 +122,11 @@ impl<'l, 'p> Statement<'l, 'p> {
                 (Type::Bool, _) => layout.truth_as_int(output.node),
                 (_, Kind::Rate | Kind::Quantity) => layout.value(output.node),
             };
+            // The nearest double: readers round it to the digits of the metric, which gives the exact value back.
+            let value = match output.decimals {
+                0 => value,
+                decimals => format!("CAST({value} AS DOUBLE) / CAST(1e{decimals} AS DOUBLE)"),
+            };
             self.column(2, &format!("{value} AS {}", layout.dialect.output_name(&output.name)))?;
         }
         self.text.push_str("\nFROM e1");

@@ -25,7 +25,6 @@ pub struct SyntaxFault {
 /// by recursion.
 #[derive(Clone, Copy, Debug)]
 pub struct Grammar {
-    /// `expression`, `query`.
     pub noun: &'static str,
     pub one: &'static str,
     pub longest: usize,

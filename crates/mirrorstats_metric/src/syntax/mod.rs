@@ -33,42 +33,21 @@ pub enum ExprKind {
     /// A column, a `let` or a metric.
     Name(String),
     Literal(Literal),
-    /// `not x`
+    /// `not x`; also the `not` of `x is not null`, `x not in (...)` and the like.
     Not(Box<Expr>),
     /// `-x`
     Negate(Box<Expr>),
     /// `x op y`
     Binary(BinaryOp, Box<Expr>, Box<Expr>),
-    /// `x is [not] null`
-    IsNull {
-        operand: Box<Expr>,
-        negated: bool,
-    },
-    /// `x is [not] true`, `x is [not] false`
-    IsTruth {
-        operand: Box<Expr>,
-        truth: bool,
-        negated: bool,
-    },
-    /// `x is [not] distinct from y`
-    Distinct {
-        left: Box<Expr>,
-        right: Box<Expr>,
-        negated: bool,
-    },
-    /// `x [not] between low and high`
-    Between {
-        operand: Box<Expr>,
-        low: Box<Expr>,
-        high: Box<Expr>,
-        negated: bool,
-    },
-    /// `x [not] in (a, b, ...)`
-    InList {
-        operand: Box<Expr>,
-        list: Vec<Expr>,
-        negated: bool,
-    },
+    IsNull(Box<Expr>),
+    /// `x is true`, `x is false`
+    IsTruth(Box<Expr>, bool),
+    /// `x is distinct from y`
+    Distinct(Box<Expr>, Box<Expr>),
+    /// `x between low and high`
+    Between(Box<Expr>, [Box<Expr>; 2]),
+    /// `x in (a, b, ...)`
+    InList(Box<Expr>, Vec<Expr>),
     /// `case [x] when a then b ... [else c] end`
     Case {
         operand: Option<Box<Expr>>,
@@ -101,6 +80,12 @@ pub enum BinaryOp {
     Arithmetic(Arithmetic),
 }
 
+/// All items; `None` if one is absent. Reads every item, so that the faults of all are found.
+pub(crate) fn complete<T>(items: impl Iterator<Item = Option<T>>) -> Option<Vec<T>> {
+    let items: Vec<Option<T>> = items.collect();
+    items.into_iter().collect()
+}
+
 impl fmt::Display for BinaryOp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -121,26 +106,24 @@ mod tests {
 
     fn shape(expr: &Expr) -> String {
         let list = |items: &[Expr]| items.iter().map(shape).collect::<Vec<_>>().join(", ");
-        let not = |negated: &bool| if *negated { "not " } else { "" };
+        let tested = |expr: &Expr, not: &str| {
+            Some(match &expr.kind {
+                ExprKind::IsNull(x) => format!("({} is {not}null)", shape(x)),
+                ExprKind::IsTruth(x, truth) => format!("({} is {not}{truth})", shape(x)),
+                ExprKind::Distinct(x, y) => format!("({} is {not}distinct from {})", shape(x), shape(y)),
+                ExprKind::Between(x, [low, high]) => {
+                    format!("({} {not}between {} and {})", shape(x), shape(low), shape(high))
+                }
+                ExprKind::InList(x, items) => format!("({} {not}in [{}])", shape(x), list(items)),
+                _ => return None,
+            })
+        };
         match &expr.kind {
             ExprKind::Name(name) => name.clone(),
             ExprKind::Literal(literal) => format!("{literal:?}"),
-            ExprKind::Not(x) => format!("(not {})", shape(x)),
+            ExprKind::Not(x) => tested(x, "not ").unwrap_or_else(|| format!("(not {})", shape(x))),
             ExprKind::Negate(x) => format!("(- {})", shape(x)),
             ExprKind::Binary(op, x, y) => format!("({} {op} {})", shape(x), shape(y)),
-            ExprKind::IsNull { operand, negated } => format!("({} is {}null)", shape(operand), not(negated)),
-            ExprKind::IsTruth { operand, truth, negated } => {
-                format!("({} is {}{truth})", shape(operand), not(negated))
-            }
-            ExprKind::Distinct { left, right, negated } => {
-                format!("({} is {}distinct from {})", shape(left), not(negated), shape(right))
-            }
-            ExprKind::Between { operand, low, high, negated } => {
-                format!("({} {}between {} and {})", shape(operand), not(negated), shape(low), shape(high))
-            }
-            ExprKind::InList { operand, list: items, negated } => {
-                format!("({} {}in [{}])", shape(operand), not(negated), list(items))
-            }
             ExprKind::Case { operand, branches, otherwise } => {
                 let operand = operand.as_ref().map_or_else(String::new, |x| format!(" {}", shape(x)));
                 let branches: Vec<_> = branches.iter().map(|(a, b)| format!(" {}: {}", shape(a), shape(b))).collect();
@@ -148,6 +131,7 @@ mod tests {
                 format!("(case{operand}{}{otherwise})", branches.concat())
             }
             ExprKind::Call { name, arguments } => format!("{name}({})", list(arguments)),
+            _ => tested(expr, "").unwrap(),
         }
     }
 

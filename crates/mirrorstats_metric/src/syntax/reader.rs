@@ -5,14 +5,11 @@ use std::ops::Range;
 use sqlparser::ast::{self, Spanned as _};
 
 use super::grammar::{SyntaxFault, bytes_of, shortened};
-use super::{BinaryOp, Expr, ExprKind, Literal};
+use super::{BinaryOp, Expr, ExprKind, Literal, complete};
 use crate::logical_plan::plan::{Arithmetic, Comparison};
 
 /// The deepest nesting of one expression.
 const DEEPEST: usize = 120;
-
-/// The fault is reported already.
-struct Reported;
 
 /// Walks the parser's tree and keeps the constructs of the calculus.
 pub(super) struct Reader<'a> {
@@ -43,6 +40,9 @@ impl<'a> Reader<'a> {
 
     fn read_kind(&mut self, expr: &ast::Expr, span: &Range<usize>, depth: usize) -> Option<ExprKind> {
         use ast::Expr as Sql;
+        let not_if = |negated: bool, kind: ExprKind| {
+            if negated { ExprKind::Not(Box::new(Expr { kind, span: span.clone() })) } else { kind }
+        };
         Some(match expr {
             Sql::Nested(inner) => self.read(inner, depth)?.kind,
             Sql::Identifier(name) => ExprKind::Name(name.value.clone()),
@@ -53,25 +53,25 @@ impl<'a> Reader<'a> {
                 let (left, right) = (self.boxed(left, depth), self.boxed(right, depth));
                 ExprKind::Binary(op?, left?, right?)
             }
-            Sql::IsNull(inner) | Sql::IsUnknown(inner) => {
-                ExprKind::IsNull { operand: self.boxed(inner, depth)?, negated: false }
-            }
+            Sql::IsNull(inner) | Sql::IsUnknown(inner) => ExprKind::IsNull(self.boxed(inner, depth)?),
             Sql::IsNotNull(inner) | Sql::IsNotUnknown(inner) => {
-                ExprKind::IsNull { operand: self.boxed(inner, depth)?, negated: true }
+                not_if(true, ExprKind::IsNull(self.boxed(inner, depth)?))
             }
-            Sql::IsTrue(inner) => self.truth(inner, true, false, depth)?,
-            Sql::IsNotTrue(inner) => self.truth(inner, true, true, depth)?,
-            Sql::IsFalse(inner) => self.truth(inner, false, false, depth)?,
-            Sql::IsNotFalse(inner) => self.truth(inner, false, true, depth)?,
-            Sql::IsDistinctFrom(left, right) => self.distinct(left, right, false, depth)?,
-            Sql::IsNotDistinctFrom(left, right) => self.distinct(left, right, true, depth)?,
+            Sql::IsTrue(inner) => ExprKind::IsTruth(self.boxed(inner, depth)?, true),
+            Sql::IsNotTrue(inner) => not_if(true, ExprKind::IsTruth(self.boxed(inner, depth)?, true)),
+            Sql::IsFalse(inner) => ExprKind::IsTruth(self.boxed(inner, depth)?, false),
+            Sql::IsNotFalse(inner) => not_if(true, ExprKind::IsTruth(self.boxed(inner, depth)?, false)),
+            Sql::IsDistinctFrom(left, right) | Sql::IsNotDistinctFrom(left, right) => {
+                let (left, right) = (self.boxed(left, depth), self.boxed(right, depth));
+                not_if(matches!(expr, Sql::IsNotDistinctFrom(..)), ExprKind::Distinct(left?, right?))
+            }
             Sql::Between { expr, negated, low, high } => {
                 let (operand, low, high) = (self.boxed(expr, depth), self.boxed(low, depth), self.boxed(high, depth));
-                ExprKind::Between { operand: operand?, low: low?, high: high?, negated: *negated }
+                not_if(*negated, ExprKind::Between(operand?, [low?, high?]))
             }
             Sql::InList { expr, list, negated } => {
-                let operand = self.boxed(expr, depth);
-                ExprKind::InList { operand: operand?, list: self.all(list.iter(), depth)?, negated: *negated }
+                let (operand, list) = (self.boxed(expr, depth), self.all(list.iter(), depth));
+                not_if(*negated, ExprKind::InList(operand?, list?))
             }
             Sql::Case { operand, conditions, else_result, .. } => {
                 return self.case(operand.as_deref(), conditions, else_result.as_deref(), depth);
@@ -86,22 +86,7 @@ impl<'a> Reader<'a> {
     }
 
     fn all<'e>(&mut self, list: impl Iterator<Item = &'e ast::Expr>, depth: usize) -> Option<Vec<Expr>> {
-        // Collected in two steps so that the faults of every item are found.
-        let items: Vec<Option<Expr>> = list.map(|item| self.read(item, depth)).collect();
-        items.into_iter().collect()
-    }
-
-    fn optional(&mut self, expr: Option<&ast::Expr>, depth: usize) -> Result<Option<Box<Expr>>, Reported> {
-        expr.map(|expr| self.boxed(expr, depth).ok_or(Reported)).transpose()
-    }
-
-    fn truth(&mut self, inner: &ast::Expr, truth: bool, negated: bool, depth: usize) -> Option<ExprKind> {
-        Some(ExprKind::IsTruth { operand: self.boxed(inner, depth)?, truth, negated })
-    }
-
-    fn distinct(&mut self, left: &ast::Expr, right: &ast::Expr, negated: bool, depth: usize) -> Option<ExprKind> {
-        let (left, right) = (self.boxed(left, depth), self.boxed(right, depth));
-        Some(ExprKind::Distinct { left: left?, right: right?, negated })
+        complete(list.map(|item| self.read(item, depth)))
     }
 
     fn unary(
@@ -120,25 +105,17 @@ impl<'a> Reader<'a> {
     }
 
     fn operator(&mut self, op: &ast::BinaryOperator, span: &Range<usize>) -> Option<BinaryOp> {
-        use ast::BinaryOperator as Sql;
-        Some(match op {
-            Sql::And => BinaryOp::And,
-            Sql::Or => BinaryOp::Or,
-            Sql::Eq => BinaryOp::Compare(Comparison::Equal),
-            Sql::NotEq => BinaryOp::Compare(Comparison::NotEqual),
-            Sql::Lt => BinaryOp::Compare(Comparison::Less),
-            Sql::LtEq => BinaryOp::Compare(Comparison::LessEqual),
-            Sql::Gt => BinaryOp::Compare(Comparison::Greater),
-            Sql::GtEq => BinaryOp::Compare(Comparison::GreaterEqual),
-            Sql::Plus => BinaryOp::Arithmetic(Arithmetic::Add),
-            Sql::Minus => BinaryOp::Arithmetic(Arithmetic::Subtract),
-            Sql::Multiply => BinaryOp::Arithmetic(Arithmetic::Multiply),
-            Sql::Modulo => BinaryOp::Arithmetic(Arithmetic::Remainder),
-            Sql::Divide => {
-                let help = "an episode's value is an integer: write `div(a, b)`, which drops the fraction";
-                return self.refuse(span.clone(), "the operator `/` is not supported", Some(help));
-            }
-            other => return self.refuse(span.clone(), format!("the operator `{other}` is not supported"), None),
+        match op {
+            ast::BinaryOperator::And => return Some(BinaryOp::And),
+            ast::BinaryOperator::Or => return Some(BinaryOp::Or),
+            _ => {}
+        }
+        let sign = op.to_string();
+        let comparison = Comparison::named(&sign).map(BinaryOp::Compare);
+        comparison.or_else(|| Arithmetic::named(&sign).map(BinaryOp::Arithmetic)).or_else(|| {
+            let help = "an episode's value is an integer: write `div(a, b)`, which drops the fraction";
+            let help = (sign == "/").then_some(help);
+            self.refuse(span.clone(), format!("the operator `{sign}` is not supported"), help)
         })
     }
 
@@ -176,15 +153,13 @@ impl<'a> Reader<'a> {
         otherwise: Option<&ast::Expr>,
         depth: usize,
     ) -> Option<ExprKind> {
-        let operand = self.optional(operand, depth);
+        let operand = operand.map(|operand| self.boxed(operand, depth));
         let whens = self.all(conditions.iter().map(|when| &when.condition), depth);
         let thens = self.all(conditions.iter().map(|when| &when.result), depth);
-        let otherwise = self.optional(otherwise, depth);
-        Some(ExprKind::Case {
-            operand: operand.ok()?,
-            branches: whens?.into_iter().zip(thens?).collect(),
-            otherwise: otherwise.ok()?,
-        })
+        let otherwise = otherwise.map(|otherwise| self.boxed(otherwise, depth));
+        let branches = whens?.into_iter().zip(thens?).collect();
+        let present = |part: Option<Option<Box<Expr>>>| part.map_or(Some(None), |part| part.map(Some));
+        Some(ExprKind::Case { operand: present(operand)?, branches, otherwise: present(otherwise)? })
     }
 
     fn call(&mut self, function: &ast::Function, span: &Range<usize>, depth: usize) -> Option<ExprKind> {

@@ -28,7 +28,6 @@ pub enum Form {
 pub struct Cursor {
     pages: Pages,
     physical: Physical,
-    /// True if nulls are possible.
     optional: bool,
     form: Form,
     dictionary: Option<Dictionary>,

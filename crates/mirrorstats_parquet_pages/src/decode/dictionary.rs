@@ -9,7 +9,6 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use crate::column::Keys;
 use crate::error::Unsupported;
 
-/// The distinct values of a column: texts or 64-bit integers.
 pub(crate) struct Dictionary(ArrayRef);
 
 impl Dictionary {

@@ -39,7 +39,6 @@ pub(crate) struct About {
     pub(crate) physical: Physical,
     /// The size of a `FIXED_LEN_BYTE_ARRAY` value, in bytes.
     pub(crate) width: usize,
-    /// True if nulls are possible.
     pub(crate) optional: bool,
     pub(crate) rows: usize,
 }

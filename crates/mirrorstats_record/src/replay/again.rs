@@ -1,15 +1,17 @@
+use std::collections::BTreeMap;
+
 use serde_json::Value as Json;
 
 use super::error::{Divergence, ReplayError};
+use crate::rollout;
 use mirrorstats_experiment::spec::Side;
 use mirrorstats_experiment::{Experiment, Spec};
 use mirrorstats_sim::config::WorldConfig;
-use mirrorstats_sim::scene::{SCENE_VERSIONS, Scene};
-use mirrorstats_sim::visibility::{Visibility, by_column};
+use mirrorstats_sim::scene::{SCENE_VERSION, Scene};
+use mirrorstats_sim::visibility::Visibility;
 use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::answers::Answered;
-use mirrorstats_trace::episodes::episode::{Episode, Extra, Step};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::episodes::episode::{Episode, Step};
 use mirrorstats_trace::schema::{self, Value};
 
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +24,7 @@ impl Recipe {
     pub fn from_recording(recording: &Json) -> Result<Self, ReplayError> {
         // This check is first: a world of another version may lack values that this one has.
         let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
-        if !SCENE_VERSIONS.iter().any(|drawn| *version == *drawn) {
+        if *version != SCENE_VERSION {
             return Err(ReplayError::Scenes { found: version.to_string() });
         }
         let world = recording.get("world").ok_or(ReplayError::NoRecipe)?;
@@ -62,95 +64,81 @@ pub fn again<E: From<ReplayError>>(
 ) -> Result<Option<Divergence>, E> {
     let mut world = recipe.world(episode, eye)?;
     let is_same_eye = *eye == recipe.config;
-    let mut parted = differs(episode, 0, &constants(episode, world.scene()));
-    for (t, (at, step)) in (1..).zip(episode.steps.iter().enumerate()) {
+    let mut replayed = rollout::constants(world.scene());
+    for (t, step) in (1..).zip(&episode.steps) {
         let visibility = world.visibility();
         look(t, &world, &visibility, step)?;
-        let mut columns = poses(step, &world);
+        let mut extra = rollout::world_columns(&world, &visibility, step.selected_cube.as_deref());
         if is_same_eye {
-            columns.extend(counts(episode, at, &world, &visibility));
+            let condition = episode.condition.as_deref().unwrap_or("default");
+            world.scene().experiment.put(Side::Truth, &world.truths(condition, &visibility), &mut extra);
         }
-        let truths = if is_same_eye { truths(episode, step, &world, &visibility) } else { Vec::new() };
-        let bumped = world.act(step.action).bumped;
-        let distance = world.target_distance().map_or("none".to_owned(), |distance| distance.to_string());
-        columns.extend(step.extra.target_distance.map(|own| ("target_distance", own.to_string(), distance)));
-        columns.extend(step.extra.bumped.map(|own| ("bumped", own.to_string(), bumped.to_string())));
-        parted = parted.or_else(|| differs(episode, t, &columns)).or_else(|| differs(episode, t, &truths));
+        let mirror_visible = world.is_mirror_visible(&visibility);
+        extra.bumped = Some(world.act(step.action).bumped);
+        extra.target_distance = world.target_distance();
+        replayed.steps.push(Step { mirror_visible, extra, ..Step::default() });
     }
-    Ok(parted)
+    Ok(divergence(episode, &replayed, is_same_eye))
 }
 
-/// A column, the trace's value, and the replay's value.
-type Compared<N = &'static str> = (N, String, String);
+const CONSTANTS: &[&str] = &["body_color", "stated_color", "shown_color", "start_distance", "distractors"];
+const MOTION: &[&str] = &["pose_x", "pose_y", "pose_yaw", "cube_distance", "mark_color"];
+const SIGHT: &[&str] = &[
+    "mirror_self_px",
+    "mirror_other_px",
+    "mirror_px",
+    "direct_other_px",
+    "mirror_mark_px",
+    "mirror_double_px",
+    "shown_px",
+    "pane1_body_px",
+    "pane2_body_px",
+    "pane3_body_px",
+    "pane4_body_px",
+    "mark1_px",
+    "mark2_px",
+    "mark3_px",
+    "mark4_px",
+    "mirror_visible",
+];
+const EFFECTS: &[&str] = &["target_distance", "bumped"];
 
-fn differs<N: AsRef<str>>(episode: &Episode, t: i32, columns: &[Compared<N>]) -> Option<Divergence> {
-    let (column, expected, found) = columns.iter().find(|(_, expected, found)| expected != found)?;
-    Some(Divergence {
-        episode_id: episode.episode_id.clone(),
-        t,
-        column: column.as_ref().to_owned(),
-        expected: expected.clone(),
-        found: found.clone(),
-    })
+/// Columns whose nulls are compared. Traces of other programs may lack values of the other columns.
+const NULLABLE: [&str; 2] = ["stated_color", "mark_color"];
+
+/// The first difference, by step and column. What is seen is only compared if the eye is the recorded one.
+fn divergence(recorded: &Episode, replayed: &Episode, is_same_eye: bool) -> Option<Divergence> {
+    let names = [CONSTANTS, MOTION, if is_same_eye { SIGHT } else { &[] }, EFFECTS].concat();
+    let of_column = |(order, name): (usize, &&str)| {
+        let column = schema::column(name)?;
+        let pairs = column.of_steps(recorded).zip(column.of_steps(replayed));
+        let mut texts = pairs.map(|(own, found)| (own.map(text), found.map(text))).enumerate();
+        let (at, (own, found)) =
+            texts.find(|(_, (own, found))| (own.is_some() || NULLABLE.contains(name)) && own != found)?;
+        let t = if CONSTANTS.contains(name) { 0 } else { at + 1 };
+        Some(((t, order), (*name).to_owned(), own, found))
+    };
+    let of_truths = |at: usize| {
+        let [own, found] = [recorded, replayed].map(|episode| &episode.steps[at].extra.answers);
+        let value = |answers: &BTreeMap<String, Answered>, name| answers.get(name).map(Answered::text);
+        let mut truths = found.keys().map(|name| (name.clone(), value(own, name), value(found, name)));
+        let (name, own, found) = truths.find(|(_, own, found)| own != found)?;
+        Some(((at + 1, names.len()), name, own, found))
+    };
+    let columns = names.iter().enumerate().filter_map(of_column);
+    let found = columns.chain((0..replayed.steps.len()).find_map(of_truths)).min_by_key(|(place, ..)| *place);
+    let ((t, _), column, own, found) = found?;
+    let [expected, found] = [own, found].map(|value| value.unwrap_or_else(|| "none".to_owned()));
+    let t = i32::try_from(t).unwrap_or(i32::MAX);
+    Some(Divergence { episode_id: recorded.episode_id.clone(), t, column, expected, found })
 }
 
-fn constants(episode: &Episode, scene: &Scene) -> Vec<Compared> {
-    let mut columns = vec![("body_color", episode.body_color.clone(), scene.body_color.name().to_owned())];
-    let stated = scene.stated_color.map_or("none", |color| color.name());
-    let own = episode.stated_color.as_deref().unwrap_or("none");
-    columns.push(("stated_color", own.to_owned(), stated.to_owned()));
-    let shown = scene.shown_color().map(|color| color.name().to_owned());
-    columns.extend(
-        episode.shown_color.clone().map(|own| ("shown_color", own, shown.unwrap_or_else(|| "none".to_owned()))),
-    );
-    let distance = scene.start_distance().map_or("none".to_owned(), |distance| distance.to_string());
-    columns.extend(episode.start_distance.map(|own| ("start_distance", own.to_string(), distance)));
-    columns.extend(episode.distractors.map(|own| ("distractors", own.to_string(), scene.others.len().to_string())));
-    columns
-}
-
-fn poses(step: &Step, world: &World) -> Vec<Compared> {
-    #[expect(clippy::cast_possible_truncation, reason = "what the trace stores")]
-    let stored = |value: f64| (value as f32).to_string();
-    let pose = world.pose();
-    let cube = step.selected_cube.as_deref().and_then(Color::named);
-    let distance = cube.and_then(|color| world.distance_to_cube(color)).map_or("none".to_owned(), stored);
-    let mark = world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned());
-    let own = step.extra.mark_color.clone();
-    let marks = (world.has_own_mark() && own != mark).then(|| {
-        let shown = |mark: Option<String>| mark.unwrap_or_else(|| "none".to_owned());
-        ("mark_color", shown(own), shown(mark))
-    });
-    let compared = [
-        ("pose_x", step.extra.pose_x, stored(pose.x)),
-        ("pose_y", step.extra.pose_y, stored(pose.y)),
-        ("pose_yaw", step.extra.pose_yaw, stored(pose.heading.degrees())),
-        ("cube_distance", step.extra.cube_distance, distance),
-    ];
-    let poses = compared.into_iter().filter_map(|(name, own, found)| Some((name, own?.to_string(), found)));
-    poses.chain(marks).collect()
-}
-
-/// The true values of the experiment's own answers; other programs' traces may lack them.
-fn truths(episode: &Episode, step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared<String>> {
-    let condition = episode.condition.as_deref().unwrap_or("default");
-    let mut again = Extra::default();
-    world.scene().experiment.put(Side::Truth, &world.truths(condition, visibility), &mut again);
-    let shown = |cell: Option<&Answered>| cell.map_or_else(|| "none".to_owned(), Answered::text);
-    let compared = again
-        .answers
-        .iter()
-        .map(|(column, found)| (column.clone(), shown(step.extra.answers.get(column)), shown(Some(found))));
-    compared.collect()
-}
-
-fn counts(episode: &Episode, at: usize, world: &World, visibility: &Visibility) -> Vec<Compared> {
-    let recorded = |name: &str| schema::column(name)?.of_steps(episode).nth(at)?;
-    let compared = by_column(world, visibility).into_iter().filter_map(|(name, found)| match recorded(name)? {
-        Value::Int(own) => Some((name, own.to_string(), found.to_string())),
-        _ => None,
-    });
-    let visible = world.is_mirror_visible(visibility);
-    let recorded = episode.steps[at].mirror_visible;
-    compared.chain([("mirror_visible", recorded.to_string(), visible.to_string())]).collect()
+fn text(value: Value<'_>) -> String {
+    match value {
+        Value::Bool(value) => value.to_string(),
+        Value::Int(value) => value.to_string(),
+        #[expect(clippy::cast_possible_truncation, reason = "what the trace stores")]
+        Value::Float(value) => (value as f32).to_string(),
+        Value::Text(value) => value.to_owned(),
+    }
 }

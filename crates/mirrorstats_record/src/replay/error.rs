@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use mirrorstats_exact::budget::Exceeded;
-use mirrorstats_sim::scene::SCENE_VERSIONS;
+use mirrorstats_sim::scene::SCENE_VERSION;
 
 /// The first difference between a replay and its trace.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
@@ -31,8 +31,7 @@ pub enum ReplayError {
     )]
     Changed { expected: String, found: String },
     #[error(
-        "the trace's worlds were drawn by version {found} of the scenes, and this program draws versions {} and {}\n  help: replay it with the program that recorded it",
-        SCENE_VERSIONS[0], SCENE_VERSIONS[1]
+        "the trace's worlds were drawn by version {found} of the scenes, and this program draws version {SCENE_VERSION}\n  help: replay it with the program that recorded it"
     )]
     Scenes { found: String },
     #[error("episode `{episode}`: {fault}")]

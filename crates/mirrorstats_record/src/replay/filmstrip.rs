@@ -1,6 +1,8 @@
 //! The frames of one episode for a film strip, from a log or rendered again from a trace.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::again::Recipe;
@@ -12,18 +14,76 @@ use mirrorstats_log::read::{Event, LogReader, png};
 use mirrorstats_log::recover::ended;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::episodes::moments::chosen;
-use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::inputs::{self, Input};
+use mirrorstats_trace::read::episode_rows::{self, EpisodeRows};
 use mirrorstats_trace::read::open::TraceSet;
-use mirrorstats_trace::write::merge::{self, EpisodeRows};
 
 /// The maximum pixels of a frame, 2048 x 2048: a small file may decode to many pixels of four bytes each.
 const LARGEST_FRAME: Limit = Limit::new("pixels in a frame", 1 << 22);
 
+/// The logs and traces to search for an episode.
 #[derive(Clone, Debug)]
-pub struct Strip {
-    pub episode: String,
-    /// The number of steps, chosen to tell the story.
-    pub count: usize,
+pub struct RecordedFiles {
+    named: Vec<OsString>,
+    pub logs: Vec<PathBuf>,
+    pub traces: Vec<Input>,
+}
+
+impl RecordedFiles {
+    /// Those of files, folders and quoted globs; the logs of a folder are those directly in it.
+    pub fn of(named: &[OsString]) -> Result<Self, ReplayError> {
+        let (mut logs, mut traces) = (Vec::new(), Vec::new());
+        for name in named {
+            let path = Path::new(name);
+            if path.is_dir() {
+                let unreadable = |error| ReplayError::other(format!("cannot read `{}`: {error}", path.display()));
+                let entries = std::fs::read_dir(path).map_err(unreadable)?;
+                let mut found: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+                found.sort();
+                traces.extend(found.iter().any(|path| ends_in(path, "parquet")).then(|| name.clone()));
+                logs.extend(found.into_iter().filter(|path| ends_in(path, "mcap")));
+            } else if ends_in(path, "mcap") {
+                logs.push(path.to_owned());
+            } else {
+                traces.push(name.clone());
+            }
+        }
+        let traces = if traces.is_empty() {
+            Vec::new()
+        } else {
+            inputs::resolve(&traces, io::stdin()).map_err(ReplayError::other)?
+        };
+        Ok(Self { named: named.to_vec(), logs, traces })
+    }
+
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.logs.iter().chain(self.traces.iter().map(|trace| &trace.path))
+    }
+
+    /// The frames of an episode, from a log or else rendered from a trace; `count` steps, chosen to tell the story.
+    pub fn reel(&self, episode: &str, count: usize) -> Result<Reel, ReplayError> {
+        let strip = Strip { episode: episode.to_owned(), count };
+        if let Some(reel) = strip.in_logs(&self.logs, &self.traces)? {
+            return Ok(reel);
+        }
+        let rendered = if self.traces.is_empty() { None } else { strip.in_traces(&self.traces)? };
+        rendered.ok_or_else(|| {
+            let named: Vec<_> = self.named.iter().map(|named| named.to_string_lossy()).collect();
+            ReplayError::other(format!(
+                "no log or trace in {} has the episode `{episode}`; `mirrorstats trace info --episodes` lists those of traces",
+                named.join(", ")
+            ))
+        })
+    }
+}
+
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|found| found == ending)
+}
+
+struct Strip {
+    episode: String,
+    count: usize,
 }
 
 /// An episode and the frames of the chosen steps, in order.
@@ -41,7 +101,7 @@ pub struct PngFrame {
 }
 
 impl Strip {
-    pub fn from_logs(&self, logs: &[PathBuf], traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
+    fn in_logs(&self, logs: &[PathBuf], traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
         for log in logs {
             if let Some(reel) = self.in_log(log)? {
                 self.check_traces(&reel.episode, log, traces)?;
@@ -84,7 +144,7 @@ impl Strip {
     fn check_traces(&self, episode: &Episode, log: &Path, traces: &[Input]) -> Result<(), ReplayError> {
         let Some(logged) = &episode.episode_hash else { return Ok(()) };
         for trace in traces {
-            let Ok(rows) = merge::read(&trace.path) else { continue };
+            let Ok(rows) = episode_rows::read(&trace.path) else { continue };
             let found = rows.iter().find(|rows| rows.episode_id == self.episode);
             if let Some(traced) = found.and_then(EpisodeRows::stated_hash).filter(|traced| traced != logged) {
                 return Err(ReplayError::apart(&self.episode, (&trace.name, &traced), (log, logged)));
@@ -93,7 +153,7 @@ impl Strip {
         Ok(())
     }
 
-    pub fn from_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
+    fn in_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
         let set = TraceSet::open(traces).map_err(ReplayError::other)?;
         let mut undrawable = None;
         for (input, file) in traces.iter().zip(set.files()) {
@@ -105,7 +165,7 @@ impl Strip {
                     continue;
                 }
             };
-            let rows = merge::read(&input.path).map_err(ReplayError::other)?;
+            let rows = episode_rows::read(&input.path).map_err(ReplayError::other)?;
             let Some(found) = rows.iter().find(|rows| rows.episode_id == self.episode) else { continue };
             return self.rendered(&recipe, found.episode().map_err(ReplayError::other)?).map(Some);
         }

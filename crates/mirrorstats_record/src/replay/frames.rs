@@ -6,6 +6,7 @@ use serde_json::Value;
 use super::again::{Recipe, again};
 use super::error::ReplayError;
 use super::verify::{check_rays, rays};
+use mirrorstats_log::write::Solid;
 use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::Episode;
@@ -13,7 +14,6 @@ use mirrorstats_trace::episodes::episode::Episode;
 /// The rows of rays for visibility here, where the counts are unused: counting takes most of a replay's time.
 const RAYS: u32 = 24;
 
-/// The end of a replay before its last step.
 enum Halt {
     Done,
     Fault(ReplayError),
@@ -31,11 +31,31 @@ pub fn frames(
     episode: &Episode,
     steps: &RangeInclusive<i32>,
 ) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
+    let (recipe, eye) = with_few_rays(recording)?;
+    rendered(&recipe, &eye, episode, *steps.end(), |t| steps.contains(&t))
+}
+
+/// Replays an episode, and passes the shapes of each step with its t.
+pub fn shapes(
+    recording: Option<&Value>,
+    episode: &Episode,
+    give: &mut dyn FnMut(usize, &[Solid]),
+) -> Result<(), ReplayError> {
+    let (recipe, eye) = with_few_rays(recording)?;
+    check_rays(rays(episode.steps.len(), &eye), 0)?;
+    let ended = again(&recipe, &eye, episode, |t, world, _, _| -> Result<(), ReplayError> {
+        give(usize::try_from(t).unwrap_or_default(), &world.snapshot().solids);
+        Ok(())
+    });
+    ended?.map_or(Ok(()), |parted| Err(ReplayError::Diverged(parted)))
+}
+
+fn with_few_rays(recording: Option<&Value>) -> Result<(Recipe, WorldConfig), ReplayError> {
     let recipe = Recipe::from_recording(recording.unwrap_or(&Value::Null))?;
     let mut eye = recipe.config.clone();
     let columns = eye.eye.width * RAYS / eye.eye.height_px.max(1);
     (eye.eye.width, eye.eye.height_px) = (columns.max(1), RAYS);
-    rendered(&recipe, &eye, episode, *steps.end(), |t| steps.contains(&t))
+    Ok((recipe, eye))
 }
 
 /// Replays an episode up to a step, and returns the wanted frames as PNG, by t.

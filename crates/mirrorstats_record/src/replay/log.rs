@@ -7,12 +7,11 @@ use schemars::schema_for;
 use serde_json::Value;
 
 use mirrorstats_log::message::Decision;
-use mirrorstats_log::write::{EpisodeLog, Form, Solid, View};
-use mirrorstats_sim::snapshot::{self, Shape};
+use mirrorstats_log::write::{EpisodeLog, View};
 use mirrorstats_sim::visibility::Visibility;
 use mirrorstats_sim::world::World;
 use mirrorstats_trace::episodes::episode::{Episode, Step};
-use mirrorstats_trace::episodes::frame::Frame;
+use mirrorstats_trace::frame::Frame;
 
 static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
 
@@ -27,7 +26,6 @@ pub struct Seen<'a> {
 pub(crate) type LogFault = Box<dyn std::error::Error + Send + Sync>;
 
 pub struct Log {
-    /// The seed, run and repetition.
     place: (i32, i32, i32),
     file: EpisodeLog,
 }
@@ -47,8 +45,7 @@ impl Log {
     pub fn seen(&mut self, seen: &Seen<'_>) -> Result<(), LogFault> {
         let png = seen.frame.map(|frame| frame.to_png()).transpose()?;
         let snapshot = seen.world.snapshot();
-        let solids: Vec<Solid> = snapshot.solids.iter().map(solid).collect();
-        let view = View { png, placed: &snapshot.frames, solids: &solids, census: seen.visibility };
+        let view = View { png, placed: &snapshot.frames, solids: &snapshot.solids, census: seen.visibility };
         Ok(self.file.seen(time(self.place, seen.t), &view)?)
     }
 
@@ -71,17 +68,6 @@ pub fn frame_time(seed: i32, run: i32, repetition: i32, t: i32) -> i64 {
     (episode * 1_000 + i64::from(t)) * SECOND + i64::from(repetition - 1) * MILLISECOND
 }
 
-/// The time of a step in the log, never below 0.
 fn time((seed, run, repetition): (i32, i32, i32), t: i32) -> u64 {
     u64::try_from(frame_time(seed, run, repetition, t)).unwrap_or(0)
-}
-
-fn solid(solid: &snapshot::Solid) -> Solid {
-    let form = match solid.shape {
-        Shape::Plane([x, y]) => Form::Box([x, y, 0.0]),
-        Shape::Sphere(radius) => Form::Sphere(radius),
-        Shape::Capsule { radius, length } => Form::Capsule { radius, length },
-        Shape::Box(edges) => Form::Box(edges),
-    };
-    Solid { name: solid.name.clone(), form, position: solid.position, rotation: solid.rotation, rgba: solid.rgba }
 }

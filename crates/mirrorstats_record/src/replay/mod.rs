@@ -7,4 +7,5 @@ pub mod error;
 pub mod filmstrip;
 pub mod frames;
 pub mod log;
+pub mod outputs;
 pub mod verify;

@@ -11,17 +11,18 @@ use serde_json::Value;
 use super::again::{Recipe, again};
 use super::error::{Divergence, ReplayError};
 use super::log::{Log, Seen};
+use super::outputs::Outputs;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::replace::TemporaryFolder;
 use mirrorstats_log::assemble;
 use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::Episode;
-use mirrorstats_trace::episodes::frame::{Frame, Likeness, TOLERANCE, likeness};
 use mirrorstats_trace::footers::renderer::{self, Renderer};
+use mirrorstats_trace::frame::{Frame, Likeness, TOLERANCE, likeness};
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows::{self, EpisodeRows};
 use mirrorstats_trace::read::open::TraceSet;
-use mirrorstats_trace::write::merge::{self, EpisodeRows};
 
 /// The limit of a replay's work: 11,000 steps with the usual grid, which take eight seconds; more for larger traces.
 pub(super) fn check_rays(rays: u64, bytes: u64) -> Result<(), ReplayError> {
@@ -29,7 +30,6 @@ pub(super) fn check_rays(rays: u64, bytes: u64) -> Result<(), ReplayError> {
     limit.and_beyond(1 << 20, 12_288, bytes).check(rays).map_err(ReplayError::other)
 }
 
-/// The rays of a replay of this many steps.
 pub(super) fn rays(steps: usize, eye: &WorldConfig) -> u64 {
     (u64::from(eye.eye.width) * u64::from(eye.eye.height_px)).saturating_mul(steps as u64)
 }
@@ -39,12 +39,6 @@ pub struct RecordedTrace {
     pub rows: Vec<EpisodeRows>,
     recording: Value,
     recipe: Recipe,
-}
-
-#[derive(Clone, Debug, Default)]
-pub struct Outputs {
-    pub frames: Option<PathBuf>,
-    pub log: Option<PathBuf>,
 }
 
 /// The result.
@@ -87,7 +81,7 @@ impl RecordedTrace {
             let recording = file.recording();
             let named = |fault| ReplayError::InTrace { trace: file.name().to_owned(), fault: Box::new(fault) };
             let recipe = Recipe::from_recording(&recording).map_err(named)?;
-            let mut rows = merge::read(&input.path).map_err(ReplayError::other)?;
+            let mut rows = episode_rows::read(&input.path).map_err(ReplayError::other)?;
             rows.retain(|rows| episode.is_none_or(|id| rows.episode_id == id));
             traces.push(Self { path: input.path.clone(), rows, recording, recipe });
         }
@@ -97,8 +91,7 @@ impl RecordedTrace {
         Ok(traces)
     }
 
-    /// Rejects traces that would take too long to replay.
-    pub fn check_work(traces: &[Self]) -> Result<(), ReplayError> {
+    pub(super) fn check_work(traces: &[Self]) -> Result<(), ReplayError> {
         let bytes =
             traces.iter().map(|trace| std::fs::metadata(&trace.path).map_or(0, |metadata| metadata.len())).sum();
         let steps = |trace: &Self| trace.rows.iter().map(EpisodeRows::len).sum();
@@ -226,6 +219,6 @@ impl TracePlayer<'_> {
     }
 }
 
-pub fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {
+pub(super) fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {
     folder.join(episode_id.replace('/', "-")).join(format!("t{t:0>3}.png"))
 }

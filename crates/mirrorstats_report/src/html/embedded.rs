@@ -13,7 +13,6 @@ use super::filter::shown;
 use super::pair::pairs;
 use super::{HtmlError, Page};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_score::cells::group::membership;
 
 /// JavaScript's largest safe integer: it represents all smaller ones exactly.
 const LARGEST_SAFE: u64 = (1 << 53) - 1;
@@ -67,7 +66,7 @@ pub(super) fn json(page: &Page<'_>, metrics: &[Json], undefined: &str) -> Result
                 .collect(),
             seed: episodes.keys.iter().map(|key| key.seed).collect(),
             run: episodes.keys.iter().map(|key| key.run).collect(),
-            group: membership(episodes, &cells.by)?,
+            group: cells.membership(episodes)?,
             values: episodes
                 .metrics
                 .iter()

@@ -18,6 +18,7 @@ mod template;
 use crate::bundle::Manifest;
 use crate::layout::MetricTable;
 use mirrorstats_analysis::statistics::Statistics;
+use mirrorstats_figures::{Figure, FigureName, font_style_sheet};
 use mirrorstats_score::cells::Cells;
 use mirrorstats_score::cells::group::GroupError;
 use mirrorstats_score::tables::table::EpisodeTable;
@@ -33,21 +34,12 @@ pub struct Page<'a> {
     pub episodes: &'a EpisodeTable,
     pub manifest: &'a Manifest,
     /// The figures, in order; an empty slice omits the section.
-    pub figures: &'a [EmbeddedFigure<'a>],
+    pub figures: &'a [(FigureName, Figure)],
     /// The statistics; `None` omits the section.
     pub statistics: Option<&'a Statistics>,
     pub lists: &'a [ListTable],
     /// The recordings behind the episodes; absent for files of scores.
     pub recordings: Option<&'a Recordings>,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub struct EmbeddedFigure<'a> {
-    pub name: &'a str,
-    pub title: &'a str,
-    pub caption: &'a str,
-    /// An `<svg>` element, used unchanged: names in it must be escaped.
-    pub svg: &'a str,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -70,7 +62,7 @@ pub fn sections(page: &Page<'_>, names: &[&str]) -> Result<Vec<String>, HtmlErro
 }
 
 pub fn style_sheet() -> String {
-    format!("{}\n{}", mirrorstats_figures::font_style_sheet(), template::STYLE)
+    format!("{}\n{}", font_style_sheet(), template::STYLE)
 }
 
 pub fn render(page: &Page<'_>) -> Result<String, HtmlError> {

@@ -8,17 +8,16 @@ use serde_json::{Value as Json, json};
 
 use super::filter::{Filters, shown};
 use super::template::markup;
-use super::{EmbeddedFigure, HtmlError, Page, definitions, embedded, pair};
-use crate::bundle::Manifest;
+use super::{HtmlError, Page, definitions, embedded, pair};
+use crate::bundle::{Manifest, cell_numbers};
 use crate::layout::{self, MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, heading, row_key};
 use mirrorstats_analysis::statistics::Statistics;
 use mirrorstats_analysis::statistics::text::Length;
 use mirrorstats_exact::escape::visible;
-use mirrorstats_exact::moments::Moments;
-use mirrorstats_exact::number::{Decimal, full_precision};
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_exact::ratio::Ratio;
-use mirrorstats_figures as figures;
-use mirrorstats_metric::catalogs::catalog::{Better, Kind, Metric};
+use mirrorstats_figures::{Figure, FigureName, font_style_sheet};
+use mirrorstats_metric::catalogs::catalog::{Better, Kind};
 use mirrorstats_score::cells::group::group;
 use mirrorstats_score::cells::{Cell, Cells};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef};
@@ -36,7 +35,7 @@ pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
     let data = embedded::json(page, &metrics, undefined)?;
     let tables = page.tables.iter().map(|of| table(of, page.cells, &filters)).collect::<Result<Vec<_>, _>>()?;
     Ok(context! {
-        font => markup(&figures::font_style_sheet()),
+        font => markup(&font_style_sheet()),
         subject => visible(&catalog.subject()),
         counts => Serde(counts(page.episodes)),
         filters => Serde(filters.filters),
@@ -80,7 +79,7 @@ fn column(column: &MetricColumn) -> Json {
         Better::Higher | Better::Neither => "descending",
         Better::Lower => "ascending",
     };
-    json!({ "metric": visible(&column.metric), "arrow": column.better.arrow(), "best_first": best_first })
+    json!({ "metric": visible(&column.metric), "heading": visible(&column.heading), "arrow": column.better.arrow(), "best_first": best_first })
 }
 
 fn row_group(group: &MetricRows, table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
@@ -118,11 +117,10 @@ fn row(row: &MetricRow, table: &MetricTable, cells: &Cells, filters: &Filters) -
 /// One table cell. The attributes have the text of `cells.csv`, empty for undefined; a missing value that a style
 /// prints as zero keeps its empty attributes.
 fn cell(cell: &MetricCell, of: Cell, undefined: &str, chance: Option<Ratio>) -> Json {
-    let Cell { name, metric, moments, interval, .. } = of;
     let (estimate, detail) = cell.value.parts(&visible(undefined));
-    let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
+    let [_, sum, sum_sq, mean, se, ci_low, ci_high] = cell_numbers(&of);
     json!({
-        "metric": visible(name),
+        "metric": visible(of.name),
         "estimate": estimate,
         // The uncertainty; empty without one.
         "detail": detail.unwrap_or_default(),
@@ -132,15 +130,15 @@ fn cell(cell: &MetricCell, of: Cell, undefined: &str, chance: Option<Ratio>) -> 
         "is_whole": matches!(cell.value, layout::Value::MeanSe { .. }),
         "element": element(cell.emphasis),
         "mark": if cell.is_marked { DAGGER.to_string() } else { String::new() },
-        "n": moments.n,
-        "sum": moments.sum.to_string(),
-        "sum_sq": moments.sum_sq.to_string(),
-        "mean": of(moments.mean()),
-        "se": of(moments.se(metric.se)),
-        "ci_low": of(interval.map(|i| i.low)),
-        "ci_high": of(interval.map(|i| i.high)),
+        "n": of.moments.n,
+        "sum": sum,
+        "sum_sq": sum_sq,
+        "mean": mean,
+        "se": se,
+        "ci_low": ci_low,
+        "ci_high": ci_high,
         "chance": chance.map(|level| level.to_string()).unwrap_or_default(),
-        "strip": strip(metric, moments, interval),
+        "strip": strip(&of),
     })
 }
 
@@ -152,15 +150,15 @@ fn element(emphasis: Emphasis) -> &'static str {
     }
 }
 
-fn strip(metric: &Metric, moments: &Moments, interval: Option<Interval>) -> Option<Json> {
+fn strip(of: &Cell) -> Option<Json> {
     let place = |share: f64| Decimal::of_float(share, 3).map(Decimal::compact);
-    let Interval { low, high } = interval.filter(|_| metric.kind == Kind::Rate)?;
-    Some(json!({ "low": place(low)?, "width": place(high - low)?, "mean": place(moments.mean()?)? }))
+    let Interval { low, high } = of.interval.filter(|_| of.metric.kind == Kind::Rate)?;
+    Some(json!({ "low": place(low)?, "width": place(high - low)?, "mean": place(of.moments.mean()?)? }))
 }
 
-fn figure(figure: &EmbeddedFigure<'_>) -> Value {
-    let [name, title, caption] = [figure.name, figure.title, figure.caption].map(visible);
-    context! { name, title, caption, svg => markup(figure.svg) }
+fn figure((name, figure): &(FigureName, Figure)) -> Value {
+    let [title, caption] = [figure.title(), figure.caption()].map(visible);
+    context! { name => name.name(), title, caption, svg => markup(&figure.inline_svg()) }
 }
 
 fn statistics(statistics: &Statistics) -> Json {

@@ -4,13 +4,13 @@
 //! for people, [`MetricTable::records`] for programs.
 
 use crate::layout::key_field;
-use crate::style::CellForm;
+use crate::style::{CellForm, Style, TableLayout};
 use mirrorstats_analysis::statistics::Ranks;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::Decimal;
-use mirrorstats_metric::catalogs::catalog::Better;
+use mirrorstats_metric::catalogs::catalog::{Better, Catalog};
 use mirrorstats_score::cells::KeyValue;
-use mirrorstats_score::cells::group::CONDITION;
+use mirrorstats_score::tables::table::CONDITION;
 use mirrorstats_tables::{Align, Column, Emphasis, ListTable, Look, RowGroup, Table, TableCell};
 
 /// A table of cells under a style.
@@ -37,12 +37,18 @@ pub struct MetricTable {
     pub columns: Vec<MetricColumn>,
     /// The rows, in groups that share a heading and compete.
     pub groups: Vec<MetricRows>,
+    /// The layout for people.
+    pub layout: TableLayout,
+    /// The means over the groups, one row for each model, if they are printed.
+    pub means: Vec<MetricRow>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MetricColumn {
     pub metric: String,
-    /// The heading as LaTeX, if the escaped name does not suffice.
+    /// The heading: the style's; else the title in domains other than the mirror, whose metrics the paper abbreviates.
+    pub heading: String,
+    /// The heading as LaTeX, if the escaped text does not suffice.
     pub latex: Option<String>,
     pub better: Better,
 }
@@ -51,6 +57,8 @@ pub struct MetricColumn {
 pub struct MetricRows {
     /// `E1: Active mirror-based self-identification`; `None` if there is only one group.
     pub heading: Option<String>,
+    /// `E1`, or the title in domains other than the mirror: the heading of a column.
+    pub short: String,
     pub rows: Vec<MetricRow>,
 }
 
@@ -71,8 +79,10 @@ pub struct MetricCell {
     pub episodes: u64,
     /// The episodes where the metric is defined.
     pub n: u64,
-    /// The sum of the metric's values.
+    /// The sum of the metric's values, in units of the last of its digits.
     pub sum: i128,
+    /// The digits after the point of the metric's values.
+    pub decimals: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,6 +118,20 @@ pub enum Spread {
         low: Decimal,
         high: Decimal,
     },
+}
+
+impl MetricColumn {
+    pub(crate) fn new(metric: &str, style: &Style, catalog: &Catalog) -> Self {
+        let sheet = style.sheet.column.get(metric);
+        let title = || catalog.domain.as_ref().and(catalog.metric.get(metric)).map(|metric| metric.title.clone());
+        let heading = sheet.and_then(|column| column.header.clone()).or_else(title);
+        Self {
+            metric: metric.to_owned(),
+            heading: heading.unwrap_or_else(|| metric.to_owned()),
+            latex: sheet.and_then(|column| column.latex.clone()),
+            better: style.sheet.better(metric, catalog),
+        }
+    }
 }
 
 impl MetricTable {
@@ -155,8 +179,11 @@ impl MetricTable {
 
     /// For people: one line per row.
     pub fn printed(&self) -> Table {
+        if self.layout != TableLayout::Grouped {
+            return self.crossed();
+        }
         let columns = self.columns.iter().map(|column| Column {
-            heading: column.metric.clone(),
+            heading: column.heading.clone(),
             latex: column.latex.clone(),
             better: column.better,
             align: Align::Right,
@@ -204,10 +231,18 @@ impl MetricTable {
 
 impl MetricCell {
     pub fn plain(value: Value, moments: &Moments, episodes: u64) -> Self {
-        Self { value, emphasis: Emphasis::Plain, is_marked: false, episodes, n: moments.n, sum: moments.sum }
+        Self {
+            value,
+            emphasis: Emphasis::Plain,
+            is_marked: false,
+            episodes,
+            n: moments.n,
+            sum: moments.sum,
+            decimals: 0,
+        }
     }
 
-    fn printed(&self, undefined: &str) -> TableCell {
+    pub(super) fn printed(&self, undefined: &str) -> TableCell {
         let (text, detail) = self.value.parts(undefined);
         TableCell {
             text,
@@ -230,7 +265,8 @@ impl MetricCell {
                     | Value::Mean { spread: Spread::Interval { low, high }, .. } => [Some(low), Some(high)],
                     _ => [None, None],
                 };
-                let sum = if self.n == 0 { String::new() } else { self.sum.to_string() };
+                let sum = Decimal::of_units(self.sum, self.decimals.into());
+                let sum = if self.n == 0 { String::new() } else { sum.to_string() };
                 vec![self.episodes.to_string(), self.n.to_string(), sum, mean, text(low), text(high), emphasis]
             }
         }
@@ -254,10 +290,7 @@ impl Value {
 
     /// The standard error as printed.
     pub fn se(&self) -> Option<Decimal> {
-        match self {
-            Self::MeanSe { se, .. } => *se,
-            Self::Undefined | Self::Count { .. } | Self::Mean { .. } => None,
-        }
+        if let Self::MeanSe { se, .. } = self { *se } else { None }
     }
 
     /// The mean as printed, or as it would print.

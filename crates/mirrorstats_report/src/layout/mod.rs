@@ -3,13 +3,16 @@
 //! The last key column, or the model if it is a key, names the rows; the other keys head the groups. Every metric of
 //! the cells is in some table: those that the style does not name get their own table.
 
+mod crossed;
 pub(crate) mod emphasis;
 mod metric_table;
 mod order;
 pub mod quality;
 pub mod value;
 
-use crate::style::{EmphasisRule, MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
+use crate::style::{EmphasisRule, MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableLayout, TableSheet};
+use mirrorstats_exact::moments::Moments;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::Catalog;
 use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_statistics::intervals::coverage::STUDENT;
@@ -55,7 +58,7 @@ fn sheets(cells: &Cells, style: &Style) -> Vec<(String, TableSheet)> {
     let left_over: Vec<String> = cells.metrics.iter().filter(|m| exists(m) && !is_named(m)).cloned().collect();
     if let Some((_, main)) = sheets.first_mut().filter(|(_, main)| main.columns.is_empty()) {
         main.columns = cells.metrics.iter().filter(|metric| exists(metric)).cloned().collect();
-    } else if style.is_built_in() && left_over.len() <= MOST_IN_MAIN {
+    } else if style.is_built_in && left_over.len() <= MOST_IN_MAIN {
         sheets.iter_mut().take(1).for_each(|(_, main)| main.columns.extend(left_over.iter().cloned()));
     } else if !left_over.is_empty() {
         sheets.insert(1, (OTHER_TABLE.to_owned(), other(left_over)));
@@ -90,7 +93,10 @@ impl<'a> Layout<'a> {
         if self.cells.by.get(self.row_key).is_some_and(|key| key == "model") {
             self.emphasise(&mut groups, sheet);
         }
+        let means = if sheet.mean { self.means(&groups, sheet) } else { Vec::new() };
         MetricTable {
+            layout: if self.cells.by.len() > 1 { sheet.layout } else { TableLayout::Grouped },
+            means,
             name: name.to_owned(),
             title: sheet.title.clone(),
             note: sheet.note(name, self.print.cell).to_owned(),
@@ -101,7 +107,7 @@ impl<'a> Layout<'a> {
             is_tied: self.print.emphasis == EmphasisRule::Tied,
             keys: self.cells.by.clone(),
             row_heading: heading(self.cells.by.get(self.row_key).map_or("", String::as_str)),
-            columns: sheet.columns.iter().map(|metric| self.column(metric)).collect(),
+            columns: sheet.columns.iter().map(|m| MetricColumn::new(m, self.style, &self.cells.catalog)).collect(),
             groups,
         }
     }
@@ -123,14 +129,6 @@ impl<'a> Layout<'a> {
         notes
     }
 
-    fn column(&self, metric: &str) -> MetricColumn {
-        MetricColumn {
-            metric: metric.to_owned(),
-            latex: self.style.sheet.column.get(metric).and_then(|column| column.latex.clone()),
-            better: self.style.sheet.better(metric, &self.cells.catalog),
-        }
-    }
-
     fn groups(&self, sheet: &TableSheet) -> Vec<MetricRows> {
         let mut ordered: Vec<&Group> = self.cells.groups.iter().collect();
         let order = TableOrder { catalog: &self.cells.catalog, style: self.style };
@@ -138,6 +136,7 @@ impl<'a> Layout<'a> {
         let runs = ordered.chunk_by(|a, b| self.heading_keys(a).eq(self.heading_keys(b)));
         runs.map(|run| MetricRows {
             heading: self.heading(run[0]),
+            short: self.short_heading(run[0]),
             rows: run.iter().map(|group| self.row(group, sheet)).collect(),
         })
         .collect()
@@ -157,6 +156,48 @@ impl<'a> Layout<'a> {
             })
             .collect();
         (!parts.is_empty()).then(|| parts.join(", "))
+    }
+
+    fn short_heading(&self, group: &Group) -> String {
+        let of_key = |(at, value): (usize, &KeyValue)| {
+            let name = self.name(value);
+            let is_titled = self.cells.by[at] == "experiment" && self.cells.catalog.domain.is_some();
+            let title = || self.cells.catalog.experiment.get(&name).map(|experiment| experiment.title.clone());
+            is_titled.then(title).flatten().filter(|title| !title.is_empty()).unwrap_or(name)
+        };
+        self.heading_keys(group).map(of_key).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The unweighted mean of each model's means over all groups; undefined where a group has none.
+    fn means(&self, groups: &[MetricRows], sheet: &TableSheet) -> Vec<MetricRow> {
+        let mut rows: Vec<MetricRow> = Vec::new();
+        for row in groups.iter().flat_map(|group| &group.rows) {
+            if rows.iter().any(|known| known.name == row.name) {
+                continue;
+            }
+            let same = groups.iter().map(|group| group.rows.iter().find(|other| other.name == row.name));
+            let keys: Option<Vec<_>> = same.map(|row| row.map(|row| &row.key)).collect();
+            let cells = sheet.columns.iter().map(|metric| {
+                let value = keys.as_ref().and_then(|keys| self.mean_of_means(keys, metric));
+                MetricCell::plain(value.unwrap_or(Value::Undefined), &Moments::default(), 0)
+            });
+            rows.push(MetricRow { cells: cells.collect(), ..row.clone() });
+        }
+        rows
+    }
+
+    fn mean_of_means(&self, keys: &[&Vec<KeyValue>], metric: &str) -> Option<Value> {
+        let mut sum = 0.0;
+        let mut places = 0;
+        for key in keys {
+            let group = self.cells.groups.iter().find(|group| group.key == **key)?;
+            let cell = self.cells.of_metric(group, metric)?;
+            let (mean, digits) = value::unrounded_mean(&cell, &self.print)?;
+            (sum, places) = (sum + mean, digits);
+        }
+        #[expect(clippy::cast_precision_loss, reason = "a number of experiments")]
+        let mean = Decimal::of_float(sum / keys.len() as f64, places)?;
+        Some(Value::Mean { mean, spread: Spread::Unknown, n: None })
     }
 
     fn name(&self, value: &KeyValue) -> String {
@@ -181,7 +222,8 @@ impl<'a> Layout<'a> {
         let value =
             if is_zero { value::zero(metric, &self.print) } else { value::value(&cell, group.episodes, &self.print) };
         let is_marked = moments.n < self.print.mark_n_below && value != Value::Undefined;
-        Some(MetricCell { is_marked, ..MetricCell::plain(value, moments, group.episodes) })
+        let decimals = metric.decimals;
+        Some(MetricCell { is_marked, decimals, ..MetricCell::plain(value, moments, group.episodes) })
     }
 
     fn emphasise(&self, groups: &mut [MetricRows], sheet: &TableSheet) {

@@ -2,11 +2,9 @@
 //!
 //! Rule: unrecorded values print as `--`, never as zero.
 
-use std::collections::BTreeMap;
-
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::fixed;
-use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, statuses};
+use mirrorstats_score::quality::{CellKey, Quality, QualityByCell, Total, statuses};
 use mirrorstats_tables::{Column, ListTable, Look, Table, text_field};
 
 const NAME: &str = "quality";
@@ -44,23 +42,33 @@ fn printed(cells: &QualityByCell, keys: usize) -> Table {
     table.with(cells.0.iter().map(|(key, quality)| row(key, quality, keys)))
 }
 
+fn names(key: &CellKey, keys: usize) -> impl Iterator<Item = &String> {
+    [&key.experiment, &key.model, &key.condition].into_iter().take(keys)
+}
+
 fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
-    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys).cloned();
+    let known = |is_known: bool, text: String| if is_known { text } else { UNKNOWN.to_owned() };
     let recorded = quality.replies() > 0;
-    let if_recorded = |text: String| if recorded { text } else { UNKNOWN.to_owned() };
-    names
-        .chain([
-            quality.episodes.to_string(),
-            quality.lost.map_or_else(|| UNKNOWN.to_owned(), |lost| lost.to_string()),
-            quality.steps.to_string(),
-            if_recorded(share(quality.unusable(), quality.replies())),
-            if_recorded(listed(quality.unread())),
-            if_recorded(repaired(quality)),
-            latency(quality),
-            tokens(quality),
-            cost(quality),
-        ])
-        .collect()
+    let repaired = match (quality.of_status("repaired"), listed(quality.repairs.iter())) {
+        (count, kinds) if kinds.is_empty() => count.to_string(),
+        (count, kinds) => format!("{count}: {kinds}"),
+    };
+    let latency = quality.latency(MEDIAN).zip(quality.latency(SLOW));
+    let latency = latency.map(|(median, slow)| format!("{median}; 95 % within {slow}"));
+    let tokens = [quality.prompt_tokens, quality.completion_tokens].map(Total::mean);
+    let [prompt, completion] = tokens.map(|tokens| fixed(tokens, 0));
+    let texts = [
+        quality.episodes.to_string(),
+        quality.lost.map_or_else(|| UNKNOWN.to_owned(), |lost| lost.to_string()),
+        quality.steps.to_string(),
+        known(recorded, share(quality.unusable(), quality.replies())),
+        known(recorded, listed(quality.unread())),
+        known(recorded, repaired),
+        latency.unwrap_or_else(|| UNKNOWN.to_owned()),
+        known(tokens.iter().any(Option::is_some), format!("{prompt} + {completion}")),
+        known(quality.cost_nano_usd.replies > 0, cost(quality, 4)),
+    ];
+    names(key, keys).cloned().chain(texts).collect()
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a share for people")]
@@ -74,29 +82,9 @@ fn listed<'a>(counts: impl Iterator<Item = (&'a String, &'a u64)>) -> String {
     counts.map(|(name, count)| format!("{} {count}", visible(name))).collect::<Vec<_>>().join(", ")
 }
 
-fn repaired(quality: &Quality) -> String {
-    let count = quality.of_status("repaired");
-    if quality.repairs.is_empty() { count.to_string() } else { format!("{count}: {}", listed(quality.repairs.iter())) }
-}
-
-fn latency(quality: &Quality) -> String {
-    match (quality.latency(MEDIAN), quality.latency(SLOW)) {
-        (Some(median), Some(slow)) => format!("{median}; 95 % within {slow}"),
-        _ => UNKNOWN.to_owned(),
-    }
-}
-
-fn tokens(quality: &Quality) -> String {
-    match (quality.prompt_tokens.mean(), quality.completion_tokens.mean()) {
-        (None, None) => UNKNOWN.to_owned(),
-        (prompt, completion) => format!("{} + {}", fixed(prompt, 0), fixed(completion, 0)),
-    }
-}
-
-#[expect(clippy::cast_precision_loss, reason = "a cost for people")]
-fn cost(quality: &Quality) -> String {
-    let total = quality.cost_nano_usd;
-    if total.replies == 0 { UNKNOWN.to_owned() } else { fixed(Some(total.sum as f64 / NANO), 4) }
+#[expect(clippy::cast_precision_loss, reason = "at most nine decimal places of a cost")]
+fn cost(quality: &Quality, places: usize) -> String {
+    fixed(Some(quality.cost_nano_usd.sum as f64 / NANO), places)
 }
 
 fn notes(cells: &QualityByCell) -> Vec<String> {
@@ -105,10 +93,26 @@ fn notes(cells: &QualityByCell) -> Vec<String> {
     if cells.0.values().any(|quality| quality.prompt_tokens.replies > 0) {
         notes.push("Tokens per request and per reply.".to_owned());
     }
+    notes.extend(unread_identifications(cells));
     if !cells.is_recorded() {
         notes.push(format!("The traces do not record how replies came ({UNKNOWN})."));
     }
     notes
+}
+
+/// The identifications that no rule reads: their number and the first of them; `None` without any.
+pub fn unread_identifications(cells: &QualityByCell) -> Option<String> {
+    const SHOWN: usize = 3;
+    const LONGEST: usize = 80;
+    let whole = cells.whole();
+    let count: u64 = whole.unread_identifications().map(|(_, replies)| replies).sum();
+    let shown = whole.unread_identifications().take(SHOWN).map(|(text, _)| {
+        let beginning: String = text.chars().take(LONGEST).collect();
+        let end = if text.chars().nth(LONGEST).is_some() { "..." } else { "" };
+        format!("\"{}{end}\"", visible(&beginning))
+    });
+    let texts: Vec<_> = shown.collect();
+    (count > 0).then(|| format!("Identifications that could not be read: {count}, such as {}.", texts.join(", ")))
 }
 
 fn records(cells: &QualityByCell, keys: usize) -> Table {
@@ -127,37 +131,31 @@ fn records(cells: &QualityByCell, keys: usize) -> Table {
     table.with(cells.0.iter().map(|(key, quality)| record(key, quality, keys)))
 }
 
-#[expect(clippy::cast_precision_loss, reason = "nine decimal places of a cost")]
 fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
-    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys);
-    let names = names.map(|name| text_field(name));
-    let recorded = quality.replies() > 0;
-    let count = |count: u64| if recorded { count.to_string() } else { String::new() };
+    let known = |is_known: bool, text: String| if is_known { text } else { String::new() };
+    let count = |count: u64| known(quality.replies() > 0, count.to_string());
     let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
-    let total = |replies: u64, sum: String| if replies > 0 { sum } else { String::new() };
-    let known: u64 = statuses().iter().map(|status| quality.of_status(status)).sum();
-    let repairs: BTreeMap<_, _> = quality.repairs.iter().collect();
-    let repairs = repairs.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join("; ");
+    let by_status = statuses().iter().map(|status| quality.of_status(status));
+    let other_status = quality.replies() - by_status.clone().sum::<u64>();
+    let repairs: Vec<_> = quality.repairs.iter().map(|(name, count)| format!("{name} {count}")).collect();
     let Quality { prompt_tokens, completion_tokens, cost_nano_usd, .. } = quality;
-    names
-        .chain([
-            quality.episodes.to_string(),
-            quality.lost.map_or_else(String::new, |lost| lost.to_string()),
-            quality.steps.to_string(),
-            count(quality.replies()),
-        ])
-        .chain(statuses().iter().map(|status| count(quality.of_status(status))))
-        .chain([
-            count(quality.unusable()),
-            count(quality.replies() - known),
-            repairs,
-            optional(quality.latency(MEDIAN)),
-            optional(quality.latency(SLOW)),
-            total(prompt_tokens.replies, prompt_tokens.sum.to_string()),
-            total(completion_tokens.replies, completion_tokens.sum.to_string()),
-            total(cost_nano_usd.replies, fixed(Some(cost_nano_usd.sum as f64 / NANO), 9)),
-        ])
-        .collect()
+    let head = [
+        quality.episodes.to_string(),
+        quality.lost.map_or_else(String::new, |lost| lost.to_string()),
+        quality.steps.to_string(),
+        count(quality.replies()),
+    ];
+    let tail = [
+        count(quality.unusable()),
+        count(other_status),
+        repairs.join("; "),
+        optional(quality.latency(MEDIAN)),
+        optional(quality.latency(SLOW)),
+        known(prompt_tokens.replies > 0, prompt_tokens.sum.to_string()),
+        known(completion_tokens.replies > 0, completion_tokens.sum.to_string()),
+        known(cost_nano_usd.replies > 0, cost(quality, 9)),
+    ];
+    names(key, keys).map(|name| text_field(name)).chain(head).chain(by_status.map(count)).chain(tail).collect()
 }
 
 #[cfg(test)]

@@ -25,6 +25,12 @@ pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
     }
 }
 
+/// The mean before it is rounded, and the digits to which it is.
+pub(super) fn unrounded_mean(cell: &Cell, print: &Print) -> Option<(f64, u32)> {
+    let (whole, places) = scale(cell.metric, print);
+    Some((cell.moments.mean()? / float_of(whole), places))
+}
+
 /// The value of an undefined cell if a style prints it as zero.
 pub(crate) fn zero(metric: &Metric, print: &Print) -> Value {
     let zero = Decimal::zero(scale(metric, print).1);
@@ -34,11 +40,11 @@ pub(crate) fn zero(metric: &Metric, print: &Print) -> Value {
 fn scale(metric: &Metric, print: &Print) -> (i128, u32) {
     match metric.whole() {
         Some(whole) => (whole.into(), print.decimals.of(Kind::Rate)),
-        None => (1, print.decimals.of(metric.kind)),
+        None => (metric.scale().into(), print.decimals.of(metric.kind).max(metric.decimals.into())),
     }
 }
 
-#[expect(clippy::cast_precision_loss, reason = "the whole of a fraction is far below 2^53")]
+#[expect(clippy::cast_precision_loss, reason = "the whole of a fraction and a power of ten are far below 2^53")]
 const fn float_of(whole: i128) -> f64 {
     whole as f64
 }

@@ -97,8 +97,8 @@ fn described(table: &MetricTable) -> String {
 
 pub fn compare(table: &MetricTable, published: &Published, errata: &[Erratum]) -> PublishedComparison {
     let ours = our_cells(table);
-    let about_table: Vec<&Erratum> = errata.iter().filter(|erratum| erratum.table == table.name).collect();
-    let mut used = vec![false; about_table.len()];
+    let mut unused: Vec<&Erratum> = errata.iter().filter(|erratum| erratum.table == table.name).collect();
+    let about_table = unused.clone();
     let mut comparison = PublishedComparison {
         table: table.name.clone(),
         cells: published.cells.len(),
@@ -112,10 +112,9 @@ pub fn compare(table: &MetricTable, published: &Published, errata: &[Erratum]) -
     for (name, theirs) in &published.cells {
         let mut found = differences(name, theirs, ours.get(name));
         for difference in &mut found {
-            let excuse = about_table.iter().position(|e| e.is_about(&table.name, name) && excuses(e, difference));
-            if let Some(at) = excuse {
-                used[at] = true;
-                difference.excused_by = Some(about_table[at].reason.clone());
+            if let Some(&erratum) = about_table.iter().find(|erratum| excuses(erratum, difference)) {
+                unused.retain(|other| !std::ptr::eq(*other, erratum));
+                difference.excused_by = Some(erratum.reason.clone());
             }
         }
         let count = match () {
@@ -126,8 +125,7 @@ pub fn compare(table: &MetricTable, published: &Published, errata: &[Erratum]) -
         *count += 1;
         comparison.differences.extend(found);
     }
-    let unused = about_table.into_iter().zip(used).filter(|(_, used)| !used);
-    comparison.unused_errata = unused.map(|(erratum, _)| erratum.clone()).collect();
+    comparison.unused_errata = unused.into_iter().cloned().collect();
     comparison
 }
 
@@ -164,17 +162,15 @@ fn differences(name: &CellLabel, theirs: &PrintedCell, ours: Option<&PrintedCell
     let Some(ours) = ours else {
         return vec![difference(None, shown(theirs), String::new())];
     };
-    let mut found = Vec::new();
-    for (field, theirs, ours) in [(Field::Mean, theirs.mean, ours.mean), (Field::Se, theirs.se, ours.se)] {
-        if !is_same(theirs, ours) {
-            found.push(difference(Some(field), text(theirs), text(ours)));
-        }
-    }
-    if theirs.emphasis != ours.emphasis {
-        let word = |emphasis: Emphasis| emphasis.word().to_owned();
-        found.push(difference(Some(Field::Emphasis), word(theirs.emphasis), word(ours.emphasis)));
-    }
-    found
+    let number = |field, theirs, ours| (field, is_same(theirs, ours), text(theirs), text(ours));
+    let word = |emphasis: Emphasis| emphasis.word().to_owned();
+    let fields = [
+        number(Field::Mean, theirs.mean, ours.mean),
+        number(Field::Se, theirs.se, ours.se),
+        (Field::Emphasis, theirs.emphasis == ours.emphasis, word(theirs.emphasis), word(ours.emphasis)),
+    ];
+    let differing = fields.into_iter().filter(|(_, is_same, ..)| !is_same);
+    differing.map(|(field, _, theirs, ours)| difference(Some(field), theirs, ours)).collect()
 }
 
 fn is_same(a: Option<Decimal>, b: Option<Decimal>) -> bool {
@@ -200,7 +196,10 @@ fn excuses(erratum: &Erratum, difference: &Difference) -> bool {
         (Ok(stated), Ok(found)) => stated.cmp_value(found).is_eq(),
         _ => stated == found,
     };
-    difference.field == Some(erratum.field)
+    let Erratum { experiment, model, metric, .. } = erratum;
+    let cell = &difference.cell;
+    (experiment, model, metric) == (&cell.experiment, &cell.model, &cell.metric)
+        && difference.field == Some(erratum.field)
         && is_stated(&erratum.published, &difference.published)
         && is_stated(&erratum.computed, &difference.computed)
 }

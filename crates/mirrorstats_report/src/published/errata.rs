@@ -5,8 +5,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::published::CellLabel;
-
 const PAPER: &str = include_str!("../../../../assets/errata/paper.toml");
 
 /// One slip.
@@ -51,13 +49,6 @@ pub fn of_paper() -> Vec<Erratum> {
     }
     let Errata { erratum } = toml::from_str(PAPER).expect("the built-in errata are well-formed: a test reads them");
     erratum
-}
-
-impl Erratum {
-    pub fn is_about(&self, table: &str, cell: &CellLabel) -> bool {
-        let CellLabel { experiment, model, metric } = cell;
-        (self.table.as_str(), &self.experiment, &self.model, &self.metric) == (table, experiment, model, metric)
-    }
 }
 
 mirrorstats_exact::names!(Field { Mean: "mean", Se: "se", Emphasis: "emphasis" });

@@ -60,8 +60,8 @@ pub enum PublishedError {
 pub enum PublishedFault {
     #[error("not a CSV file: {0}")]
     NotCsv(::csv::Error),
-    #[error("no column `{column}`: expected the columns {}{}", COLUMNS.join(", "), in_place_of(.nearest.as_deref()))]
-    MissingColumn { column: &'static str, nearest: Option<String> },
+    #[error("no column `{column}`: expected the columns {}{}", COLUMNS.join(", "), .hint)]
+    MissingColumn { column: &'static str, hint: String },
     #[error("the column `{column}` occurs twice: keep one")]
     RepeatedColumn { column: &'static str },
     #[error("column `{column}`: expected a name, found nothing")]
@@ -76,10 +76,6 @@ pub enum PublishedFault {
     RepeatedCell { experiment: String, model: String, metric: String, first: u64 },
     #[error("no cells: expected one line per cell after the header")]
     NoCells,
-}
-
-fn in_place_of(nearest: Option<&str>) -> String {
-    nearest.map(|name| format!("; is it the one called `{name}`?")).unwrap_or_default()
 }
 
 /// A line has fewer than 100 bytes, and a table a few hundred lines.
@@ -127,7 +123,9 @@ impl Columns {
             let mut found = header.iter().enumerate().filter(|(_, name)| name.trim() == column);
             let Some((at, _)) = found.next() else {
                 let strangers = header.iter().filter(|name| !COLUMNS.contains(name));
-                return Err(PublishedFault::MissingColumn { column, nearest: nearest(column, strangers).map(visible) });
+                let hint =
+                    nearest(column, strangers).map(|name| format!("; is it the one called `{}`?", visible(name)));
+                return Err(PublishedFault::MissingColumn { column, hint: hint.unwrap_or_default() });
             };
             if found.next().is_some() {
                 return Err(PublishedFault::RepeatedColumn { column });
@@ -144,18 +142,16 @@ impl Columns {
         };
         let number = |at: usize| match record[self.0[at]].trim() {
             "" | "--" => Ok(None),
-            text => text
-                .parse::<Decimal>()
-                .map(Some)
-                .map_err(|_| PublishedFault::NotANumber { column: COLUMNS[at], found: visible(text) }),
+            text => match text.parse::<Decimal>() {
+                Ok(number) => Ok(Some(number)),
+                Err(_) => Err(PublishedFault::NotANumber { column: COLUMNS[at], found: visible(text) }),
+            },
         };
-        let cell_name = CellLabel { experiment: name(0)?, model: name(1)?, metric: name(2)? };
+        let label = CellLabel { experiment: name(0)?, model: name(1)?, metric: name(2)? };
         let cell = PrintedCell { mean: number(3)?, se: number(4)?, emphasis: emphasis(record[self.0[5]].trim())? };
-        match cell {
-            PrintedCell { mean: None, se: Some(se), .. } => {
-                Err(PublishedFault::StrayStandardError { found: se.to_string() })
-            }
-            cell => Ok((cell_name, cell)),
+        match cell.se.filter(|_| cell.mean.is_none()) {
+            Some(se) => Err(PublishedFault::StrayStandardError { found: se.to_string() }),
+            None => Ok((label, cell)),
         }
     }
 }

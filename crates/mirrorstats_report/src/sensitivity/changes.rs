@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::{Level, Reference};
 use mirrorstats_analysis::statistics::{ChanceRow, Contrast, Family, Role, Sign, Statistics, Verdict};
+use mirrorstats_exact::chance::with_strategy;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog};
 
 /// The question behind a conclusion.
@@ -141,7 +142,8 @@ fn against_level(row: &ChanceRow) -> (Subject, Shown) {
         Role::Chance => "chance",
         Role::Reference => "the reference",
     };
-    let about = format!("{} {} of {} against {role} ({})", row.key.experiment, row.metric, row.key.name(), row.level);
+    let level = with_strategy(row.level, row.strategy.as_deref());
+    let about = format!("{} {} of {} against {role} ({level})", row.key.experiment, row.metric, row.key.name());
     let shown = match row.verdict {
         Verdict::Above => Some("above it".to_owned()),
         Verdict::Below => Some("below it".to_owned()),

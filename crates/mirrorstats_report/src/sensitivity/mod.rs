@@ -10,12 +10,11 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::style::Style;
-use crate::layout::MetricTable;
-use crate::layout::key_field;
+use crate::layout::{MetricTable, key_field};
+use crate::style::Style;
 use mirrorstats_analysis::statistics::Statistics;
 use mirrorstats_exact::escape::visible;
-use mirrorstats_exact::number::full_precision;
+use mirrorstats_exact::number::{Decimal, full_precision};
 use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_score::cells::{Cell, Cells, Group, KeyValue};
 use mirrorstats_tables::{Table, Terminal, escape_markdown, wrapped};
@@ -103,7 +102,7 @@ pub struct ThresholdCell {
     /// Those in which the metric is defined.
     pub n: u64,
     /// The sum of the values; for a rate, the successes.
-    pub sum: i128,
+    pub sum: Decimal,
     /// The arithmetic mean; null where nothing is defined.
     pub mean: Option<f64>,
     /// The standard error that the definition asks for; null without one.
@@ -124,6 +123,7 @@ impl Sensitivity {
         style: &Style,
     ) -> Self {
         let first = &levels.first().expect("the definitions as they are come first").cells;
+        let keys = table::keys(levels, first, style);
         Self {
             definitions: first.catalog.name.clone(),
             definitions_hash: first.catalog.hash.clone(),
@@ -133,9 +133,9 @@ impl Sensitivity {
             by: first.by.clone(),
             metrics: metrics.to_vec(),
             independent: independent.to_vec(),
-            cells: cells(levels, metrics, style),
+            cells: cells(levels, &keys, metrics),
             changes: changes::changes(levels, reference, metrics),
-            table: table::table(levels, reference, (metrics, independent), style),
+            table: table::Rows { levels, first, reference, metrics, style }.table(&keys, independent),
         }
     }
 
@@ -189,15 +189,10 @@ fn record(found: &Sensitivity, cell: &ThresholdCell) -> Vec<String> {
     .collect()
 }
 
-fn cells(levels: &[Level], metrics: &[String], style: &Style) -> Vec<ThresholdCell> {
-    let mut found = Vec::new();
-    for key in table::keys(levels, style) {
-        for level in levels {
-            let Some(group) = level.group(&key) else { continue };
-            found.extend(metrics.iter().filter_map(|metric| ThresholdCell::of(level, group, metric)));
-        }
-    }
-    found
+fn cells(levels: &[Level], keys: &[Vec<KeyValue>], metrics: &[String]) -> Vec<ThresholdCell> {
+    let groups = keys.iter().flat_map(|key| levels.iter().filter_map(|level| Some((level, level.group(key)?))));
+    let cells = |(level, group)| metrics.iter().filter_map(move |metric| ThresholdCell::of(level, group, metric));
+    groups.flat_map(cells).collect()
 }
 
 impl ThresholdCell {
@@ -210,9 +205,9 @@ impl ThresholdCell {
             kind: metric.kind,
             episodes: group.episodes,
             n: moments.n,
-            sum: moments.sum,
-            mean: moments.mean(),
-            se: moments.se(metric.se),
+            sum: metric.sums(moments)[0],
+            mean: metric.mean(moments),
+            se: metric.standard_error(moments),
         })
     }
 }

@@ -29,8 +29,8 @@ pub struct Style {
     /// SHA-256 of the file, 64 hexadecimal digits.
     pub hash: String,
     pub sheet: StyleSheet,
+    pub is_built_in: bool,
     named: Vec<(String, Place)>,
-    is_built_in: bool,
 }
 
 /// A style file. It starts from `include`, or from the style `default`, and states only what differs.
@@ -70,10 +70,27 @@ pub struct TableSheet {
     pub label: Option<String>,
     /// The metrics, in the order of the columns. Those that the scores have not are left out.
     pub columns: Vec<String>,
+    /// The rows and columns of the table.
+    pub layout: TableLayout,
+    /// True to add the mean of the experiments of each model, where every experiment has a value; not in `grouped`.
+    pub mean: bool,
     /// The settings of this table's cells that differ from the defaults.
     pub print: PrintSheet,
     /// The metrics whose undefined cells print as zero and compete as zero (a quirk of the published main table).
     pub undefined_as_zero: Vec<String>,
+}
+
+/// The rows and columns of a table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TableLayout {
+    /// Models in rows, metrics in columns, a group of rows for each experiment.
+    #[default]
+    Grouped,
+    /// Models in rows, experiments in columns, a group of rows for each metric.
+    ModelsByExperiments,
+    /// Experiments in rows, models in columns, a group of rows for each metric.
+    ExperimentsByModels,
 }
 
 impl Default for StyleSheet {
@@ -95,6 +112,8 @@ impl Default for StyleSheet {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnSheet {
+    /// The header; if absent, the metric's title, or its name in the domain of the mirror.
+    pub header: Option<String>,
     /// The header as LaTeX source, written unchanged; the escaped name if absent.
     pub latex: Option<String>,
     /// The direction to print and emphasise by; the definition's own if absent.
@@ -213,26 +232,23 @@ impl Style {
         let is_built_in = built_in_names().into_iter().any(|name| path == Path::new(name));
         let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let read::Read { sheet, named, hash } = read::read(path)?;
-        Ok(Self { name, hash, sheet, named, is_built_in })
+        Ok(Self { name, hash, sheet, is_built_in, named })
     }
 
     /// Checks that the style names only metrics of the definitions. A built-in style may name others.
     pub fn check_against(&self, catalog: &Catalog) -> Result<(), StyleError> {
         let strange = self.named.iter().filter(|(metric, _)| !catalog.metric.contains_key(metric));
         let fault = |(metric, place): &(String, Place)| {
-            let near = nearest(metric, catalog.metric.keys().map(String::as_str));
-            let known = || catalog.metric.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
-            let help =
-                near.map_or_else(|| format!("metrics are {}", known()), |near| format!("did you mean `{near}`?"));
+            let known: Vec<&str> = catalog.metric.keys().map(String::as_str).collect();
+            let help = match nearest(metric, known.iter().copied()) {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => format!("metrics are {}", known.join(", ")),
+            };
             let message = format!("the definitions `{}` have no metric `{metric}`", catalog.name);
             Fault::new(place.clone(), message).help(help)
         };
         let faults: Vec<Fault> = strange.map(fault).collect();
         if faults.is_empty() { Ok(()) } else { Err(Faults(faults).in_order().into()) }
-    }
-
-    pub fn is_built_in(&self) -> bool {
-        self.is_built_in
     }
 }
 

@@ -7,11 +7,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::interval::ranges;
 use super::{Cells, Group, KeyValue};
-pub use crate::tables::table::CONDITION;
 use crate::tables::table::{EpisodeTable, KeyRef, LabelColumn, TextColumn};
 use mirrorstats_exact::budget::{Exceeded, Limit};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_exact::suggest::hint;
+use mirrorstats_trace::footers::declared::{Cluster, Origin};
 
 /// The key columns of every episode table.
 pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episode_id"];
@@ -41,8 +41,11 @@ pub enum GroupError {
 pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
     let Membership { keys, of_row } = Membership::of(table, by)?;
     MOST_CELLS.check((keys.len() as u64).saturating_mul(table.metrics.len() as u64))?;
-    let none = |key| Group { key, episodes: 0, moments: vec![Moments::default(); table.metrics.len()] };
+    let none = |key| Group { key, episodes: 0, moments: vec![Moments::default(); table.metrics.len()], repeats: false };
     let mut groups: Vec<Group> = keys.into_iter().map(none).collect();
+    for group in repeated(table, &of_row) {
+        groups[group].repeats = true;
+    }
     let mut start = 0;
     // A table is ordered by experiment and model: grouped by them, each group is one run of rows.
     for run in of_row.chunk_by(|a, b| a == b) {
@@ -63,6 +66,21 @@ pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
         ranges: ranges(table),
         groups,
     })
+}
+
+/// The groups in which a unit has several episodes: a declared cluster, else a participant, else a scene. The scenes of a
+/// reconstruction mean nothing.
+fn repeated(table: &EpisodeTable, of_row: &[usize]) -> BTreeSet<usize> {
+    let declared = &table.declared;
+    let code = |name: &str, row: usize| table.label(name).and_then(|label| label.code(row));
+    let unit = |row: usize| match declared.cluster {
+        Some(Cluster::Seed) => Some((0, usize::try_from(i64::from(table.keys.seed(row)) - i64::from(i32::MIN)).ok()?)),
+        None => code("participant", row).map(|it| (1, it)).or_else(|| code("scene", row).map(|it| (2, it))),
+    };
+    let mut seen = BTreeSet::new();
+    let is_again = |&(row, &group): &(usize, &usize)| unit(row).is_some_and(|unit| !seen.insert((group, unit)));
+    let rows = of_row.iter().enumerate().filter(|_| declared.origin != Some(Origin::Reconstruction));
+    rows.filter(is_again).map(|(_, &group)| group).collect()
 }
 
 /// The distinct values of a key column, a label or a metric; `None` for any other name.
@@ -203,11 +221,11 @@ fn known_columns(table: &EpisodeTable) -> Vec<&str> {
 
 fn column<'a>(table: &'a EpisodeTable, name: &str) -> Option<KeyColumn<'a>> {
     Some(match name {
-        "experiment" => KeyColumn::Text(table.keys.experiments()),
-        "model" => KeyColumn::Text(table.keys.models()),
+        "experiment" => KeyColumn::Text(&table.keys.experiment),
+        "model" => KeyColumn::Text(&table.keys.model),
         "seed" => KeyColumn::Int(|key| key.seed),
         "run" => KeyColumn::Int(|key| key.run),
-        "episode_id" => KeyColumn::Text(table.keys.episode_ids()),
+        "episode_id" => KeyColumn::Text(&table.keys.episode_id),
         _ => {
             let column = table.labels.iter().find(|label| label.name == name)?;
             let is_integer = column.values.iter().flatten().all(|text| canonical_integer(text).is_some());
@@ -241,6 +259,7 @@ mod tests {
             hash: String::new(),
             open: true,
             lets: IndexMap::new(),
+            columns: IndexMap::new(),
             metric: IndexMap::new(),
             experiment: IndexMap::new(),
             factor: IndexMap::new(),

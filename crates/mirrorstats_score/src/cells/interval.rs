@@ -49,7 +49,7 @@ pub fn ranges(table: &EpisodeTable) -> Vec<Interval> {
     let range = |column: &MetricColumn| {
         let Some(metric) = table.catalog.metric.get(&column.name) else { return Interval::UNBOUNDED };
         let ValueRange { least, most } = metric.value_range();
-        let budget = || budgets.get(metric.unit.as_str()).copied();
+        let budget = || budgets.get(&(metric.unit.as_str(), metric.decimals)).copied();
         let most = match metric.measures() {
             Some(Measures::Count | Measures::Duration) => most.or_else(budget),
             _ => most,
@@ -63,8 +63,8 @@ pub fn ranges(table: &EpisodeTable) -> Vec<Interval> {
     table.metrics.iter().map(range).collect()
 }
 
-/// The length of the longest unfinished episode, by the unit of the duration.
-fn budgets(table: &EpisodeTable) -> BTreeMap<&str, i64> {
+/// The length of the longest unfinished episode, by the unit and the decimals of the duration.
+fn budgets(table: &EpisodeTable) -> BTreeMap<(&str, u8), i64> {
     let mut budgets = BTreeMap::new();
     for (duration, finished) in &Relations::of(&table.catalog).durations {
         let (Some(metric), Some(steps), Some(finished)) =
@@ -74,7 +74,7 @@ fn budgets(table: &EpisodeTable) -> BTreeMap<&str, i64> {
         };
         let unfinished = steps.iter().zip(finished.iter()).filter(|(_, finished)| finished.is_none());
         if let Some(longest) = unfinished.filter_map(|(steps, _)| steps).max() {
-            let budget = budgets.entry(metric.unit.as_str()).or_insert(longest);
+            let budget = budgets.entry((metric.unit.as_str(), metric.decimals)).or_insert(longest);
             *budget = longest.max(*budget);
         }
     }

@@ -7,6 +7,7 @@ use super::{DECLARED_KEY, DeclaredText, FormatError};
 use crate::tables::builder::TableBuilder;
 use crate::tables::table::{Declared, EpisodeTable, Header, KeyRef};
 use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::Catalog;
 
 pub(super) use crate::tables::columns::KEYS;
@@ -18,22 +19,15 @@ pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatE
     let declared = DeclaredText::of_table(table)?;
     writer.write_record(KEYS.into_iter().chain(columns).chain(declared.as_ref().map(|_| DECLARED_KEY))).map_err(io)?;
     for (row, key) in table.keys.iter().enumerate() {
-        for text in [key.episode_id, key.model, key.experiment] {
-            writer.write_field(text).map_err(io)?;
-        }
-        for number in [key.seed, key.run] {
-            writer.write_field(number.to_string()).map_err(io)?;
-        }
-        for label in &table.labels {
-            writer.write_field(label.values.get(row).unwrap_or_default()).map_err(io)?;
-        }
-        for metric in &table.metrics {
-            writer.write_field(metric.get(row).map_or_else(String::new, |value| value.to_string())).map_err(io)?;
-        }
-        if let Some(declared) = &declared {
-            writer.write_field(if row == 0 { declared.as_str() } else { "" }).map_err(io)?;
-        }
-        writer.write_record(None::<&[u8]>).map_err(io)?;
+        let (seed, run) = (key.seed.to_string(), key.run.to_string());
+        let key = [key.episode_id, key.model, key.experiment, &seed, &run];
+        let labels = table.labels.iter().map(|label| label.values.get(row).unwrap_or_default());
+        let value = |metric| table.decimal(metric, row).map_or_else(String::new, |value| value.to_string());
+        let values = table.metrics.iter().map(value);
+        let values: Vec<String> = values.collect();
+        let declared = declared.iter().map(|declared| if row == 0 { declared.as_str() } else { "" });
+        let cells = key.into_iter().chain(labels).chain(values.iter().map(String::as_str)).chain(declared);
+        writer.write_record(cells).map_err(io)?;
     }
     Ok(writer.flush()?)
 }
@@ -107,36 +101,27 @@ pub(super) fn assemble(
             },
         })?;
     }
-    let is_metric = |name: &&String| catalog.metric.contains_key(*name);
-    let metric_names: Vec<&String> = header.iter().filter(is_metric).collect();
-    let label_names: Vec<&String> = header
-        .iter()
-        .filter(|name| !is_metric(name) && !KEYS.contains(&name.as_str()) && *name != DECLARED_KEY)
-        .collect();
-    let mut declared: Option<Declared> = None;
-    let mut experiments = BTreeMap::new();
+    let is_label = |(_, name): &(usize, &String)| !KEYS.contains(&name.as_str()) && *name != DECLARED_KEY;
+    let is_metric = |(_, name): &(usize, &String)| catalog.metric.contains_key(*name);
+    let (metrics, others): (Vec<_>, Vec<_>) = header.iter().enumerate().partition(is_metric);
+    let labels: Vec<_> = others.into_iter().filter(is_label).collect();
     let declared_at = header.iter().position(|name| name == DECLARED_KEY);
-    let column = |name: &String| header.iter().position(|column| column == name).unwrap_or_default();
-    let header = Header {
-        catalog: catalog.clone(),
-        labels: label_names.iter().map(|name| (*name).clone()).collect(),
-        metrics: metric_names.iter().map(|name| (*name).clone()).collect(),
-    };
-    let mut builder = TableBuilder::new(header);
+    let names = |columns: &[(usize, &String)]| columns.iter().map(|(_, name)| (*name).clone()).collect();
+    let mut builder =
+        TableBuilder::new(Header { catalog: catalog.clone(), labels: names(&labels), metrics: names(&metrics) });
+    let (mut declared, mut experiments) = (None::<Declared>, BTreeMap::new());
     for (at, row) in rows.into_iter().enumerate() {
         let line = first_line + at;
         let cell = |position: usize| row.get(position)?.as_deref().filter(|cell| !cell.is_empty());
-        let [episode_id, model, experiment, seed, run] = positions;
-        let key = KeyRef {
-            experiment: required(cell(experiment), line, "experiment")?,
-            model: required(cell(model), line, "model")?,
-            seed: integer(required(cell(seed), line, "seed")?, line, "seed")?,
-            run: integer(required(cell(run), line, "run")?, line, "run")?,
-            episode_id: required(cell(episode_id), line, "episode_id")?,
+        let key = |at: usize| cell(positions[at]).ok_or_else(|| invalid(line, KEYS[at], "a value", ""));
+        let number = |at: usize| integer(key(at)?, line, KEYS[at]);
+        let value = |(position, name): &(usize, &String)| {
+            cell(*position).map(|text| stored(text, line, name, catalog.metric[*name].decimals)).transpose()
         };
-        let value = |name: &&String| cell(column(name)).map(|text| integer(text, line, name)).transpose();
-        let metrics: Vec<Option<i64>> = metric_names.iter().map(value).collect::<Result<_, _>>()?;
-        builder.push(key, label_names.iter().map(|name| cell(column(name))), metrics);
+        let (experiment, model, seed, run, episode_id) = (key(2)?, key(1)?, number(3)?, number(4)?, key(0)?);
+        let values: Vec<Option<i64>> = metrics.iter().map(value).collect::<Result<_, _>>()?;
+        let key = KeyRef { experiment, model, seed, run, episode_id };
+        builder.push(key, labels.iter().map(|(position, _)| cell(*position)), values);
         if let Some(text) = declared_at.and_then(cell) {
             let found = DeclaredText::parse(text)?;
             experiments.extend(found.experiments);
@@ -166,8 +151,14 @@ fn invalid(line: usize, column: &str, expected: &'static str, found: &str) -> Fo
     FormatError::Value { line, column: column.to_owned(), expected, found: found.to_owned() }
 }
 
-fn required<'a>(cell: Option<&'a str>, line: usize, column: &str) -> Result<&'a str, FormatError> {
-    cell.ok_or_else(|| invalid(line, column, "a value", ""))
+/// The stored value of a metric with decimals; texts with more digits are refused, except zeros.
+fn stored(text: &str, line: usize, column: &str, decimals: u8) -> Result<i64, FormatError> {
+    if decimals == 0 {
+        return integer(text, line, column);
+    }
+    let number = text.parse::<Decimal>().ok().and_then(|number| number.with_places(decimals.into()));
+    let units = number.and_then(|number| i64::try_from(number.units()).ok());
+    units.ok_or_else(|| invalid(line, column, "a number with the digits of the metric", text))
 }
 
 /// An integer as data frames write it: `1.0` beside missing values, and `True` or `False`.

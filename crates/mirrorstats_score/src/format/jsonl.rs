@@ -1,6 +1,6 @@
 //! The episode table as JSON lines: one object per episode, keys in the order of the columns.
 
-use std::io::{BufReader, Read, Write};
+use std::io::{self, BufReader, Read, Write};
 
 use serde_json::{Map, Value};
 
@@ -23,7 +23,10 @@ pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), For
             object.insert(label.name.clone(), label.values.get(row).map_or(Value::Null, Value::from));
         }
         for metric in &table.metrics {
-            object.insert(metric.name.clone(), metric.get(row).map_or(Value::Null, Value::from));
+            object.insert(
+                metric.name.clone(),
+                serde_json::to_value(table.decimal(metric, row)).map_err(io::Error::from)?,
+            );
         }
         if let Some(declared) = &declared {
             let value = if row == 0 { declared.as_str().into() } else { Value::Null };

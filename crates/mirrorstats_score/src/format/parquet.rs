@@ -3,9 +3,9 @@
 use std::io::Write;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use arrow::array::{Array, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray};
+use arrow::array::{ArrayAccessor, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Float64Type, Int64Type, Schema};
+use arrow::datatypes::{DataType, Decimal128Type, Float64Type, Int64Type, Schema};
 use arrow::error::ArrowError;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
@@ -172,7 +172,8 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
         .set_write_batch_size(GATHERED_ROWS)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_key_value_metadata(Some(metadata));
-    for name in header.metrics.iter().map(String::as_str).chain([KEYS[3], KEYS[4]]) {
+    let is_integer = |name: &&String| columns::metric_type(&header.catalog, name) == DataType::Int64;
+    for name in header.metrics.iter().filter(is_integer).map(String::as_str).chain([KEYS[3], KEYS[4]]) {
         properties = properties.set_column_encoding(name.into(), Encoding::DELTA_BINARY_PACKED);
     }
     Ok(properties.build())
@@ -228,31 +229,28 @@ fn append(table: &mut TableBuilder, batch: &RecordBatch) -> Result<(), FormatErr
     let [ids, models, experiments] = [texts(batch, KEYS[0])?, texts(batch, KEYS[1])?, texts(batch, KEYS[2])?];
     let [seeds, runs] = [ints(batch, KEYS[3])?, ints(batch, KEYS[4])?];
     let Header { labels, metrics, .. } = table.header();
-    let metrics: Vec<_> = metrics.iter().map(|name| ints(batch, name)).collect::<Result<_, _>>()?;
+    let catalog = &table.header().catalog;
+    let metrics: Vec<_> = metrics.iter().map(|name| stored(batch, name, catalog)).collect::<Result<_, _>>()?;
     let labels: Vec<_> = labels.iter().map(|name| texts(batch, name)).collect::<Result<_, _>>()?;
     for row in 0..batch.num_rows() {
         let number = |values: &Int64Array, column| {
-            int_at(values, row).and_then(|value| i32::try_from(value).ok()).ok_or_else(|| null(column))
+            at(values, row).and_then(|value| i32::try_from(value).ok()).ok_or_else(|| null(column))
         };
         let key = KeyRef {
-            experiment: text_at(&experiments, row).ok_or_else(|| null(KEYS[2]))?,
-            model: text_at(&models, row).ok_or_else(|| null(KEYS[1]))?,
+            experiment: at(&experiments, row).ok_or_else(|| null(KEYS[2]))?,
+            model: at(&models, row).ok_or_else(|| null(KEYS[1]))?,
             seed: number(&seeds, KEYS[3])?,
             run: number(&runs, KEYS[4])?,
-            episode_id: text_at(&ids, row).ok_or_else(|| null(KEYS[0]))?,
+            episode_id: at(&ids, row).ok_or_else(|| null(KEYS[0]))?,
         };
-        let labels = labels.iter().map(|label| text_at(label, row));
-        table.push(key, labels, metrics.iter().map(|metric| int_at(metric, row)));
+        let labels = labels.iter().map(|label| at(label, row));
+        table.push(key, labels, metrics.iter().map(|metric| at(metric, row)));
     }
     Ok(())
 }
 
-fn text_at(texts: &StringArray, row: usize) -> Option<&str> {
-    texts.is_valid(row).then(|| texts.value(row))
-}
-
-fn int_at(ints: &Int64Array, row: usize) -> Option<i64> {
-    ints.is_valid(row).then(|| ints.value(row))
+fn at<A: ArrayAccessor + Copy>(values: A, row: usize) -> Option<A::Item> {
+    values.is_valid(row).then(|| values.value(row))
 }
 
 fn null(column: &str) -> FormatError {
@@ -282,6 +280,25 @@ fn is_whole(column: &ArrayRef) -> bool {
 fn texts(batch: &RecordBatch, name: &str) -> Result<StringArray, FormatError> {
     let column = column(batch, name, &DataType::Utf8, "text")?;
     Ok(column.as_string::<i32>().clone())
+}
+
+/// The stored values of a metric. Other engines write decimals as doubles: the nearest decimal gives the double back.
+fn stored(batch: &RecordBatch, name: &str, catalog: &Catalog) -> Result<Int64Array, FormatError> {
+    let DataType::Decimal128(digits, decimals) = columns::metric_type(catalog, name) else { return ints(batch, name) };
+    let fault = |found: String| FormatError::Column {
+        column: name.to_owned(),
+        expected: "numbers with the digits of the metric",
+        found,
+    };
+    let column = batch.column_by_name(name).ok_or_else(|| fault("no such column".to_owned()))?;
+    let exact = cast(column, &DataType::Decimal128(digits, decimals)).map_err(|error| fault(error.to_string()))?;
+    let back = cast(&exact, column.data_type()).map_err(|error| fault(error.to_string()))?;
+    let is_number = column.data_type().is_numeric();
+    if !is_number || back.as_ref() != column.as_ref() {
+        return Err(fault(column.data_type().to_string()));
+    }
+    let units = exact.as_primitive::<Decimal128Type>();
+    units.try_unary(|units| i64::try_from(units).map_err(|_| fault(units.to_string())))
 }
 
 fn ints(batch: &RecordBatch, name: &str) -> Result<Int64Array, FormatError> {

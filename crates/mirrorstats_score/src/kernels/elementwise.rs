@@ -1,7 +1,7 @@
 //! Kernels that compute each value from the values at the same position. They do not know episodes.
 
 use arrow::array::{
-    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, Int64Array, PrimitiveArray,
+    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, Float64Array, Int64Array, PrimitiveArray,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::compute::kernels::{boolean, cmp, numeric};
@@ -14,7 +14,6 @@ use crate::kernels::vectors::{Vector, canonical};
 use mirrorstats_metric::columns::Type;
 use mirrorstats_metric::logical_plan::plan::{Arithmetic, Comparison};
 
-/// A comparison; null where an operand is null.
 pub(crate) fn compare(comparison: Comparison, x: &dyn Datum, y: &dyn Datum) -> Result<BooleanArray, ArrowError> {
     match comparison {
         Comparison::Equal => cmp::eq(x, y),
@@ -26,7 +25,6 @@ pub(crate) fn compare(comparison: Comparison, x: &dyn Datum, y: &dyn Datum) -> R
     }
 }
 
-/// Sum, difference or product; null where an operand is null.
 pub(crate) fn arithmetic(op: Arithmetic, x: &dyn Datum, y: &dyn Datum) -> Result<ArrayRef, ArrowError> {
     match op {
         Arithmetic::Add => numeric::add(x, y),
@@ -50,6 +48,20 @@ pub(crate) fn divide(op: Arithmetic, a: &Int64Array, b: &Int64Array) -> Result<I
     a.iter().zip(b.iter()).map(one).collect::<Result<Vec<Option<i64>>, _>>().map(Int64Array::from_iter)
 }
 
+/// Floats times a power of ten as integers, halves away from zero: in the order of operations that the SQL has, so that
+/// engines agree to the last bit.
+pub(crate) fn scale(floats: &Float64Array, decimals: u8) -> Result<Int64Array, ArrowError> {
+    // Below 2^53, neighbouring integers are different floats.
+    const LARGEST: f64 = 9_007_199_254_740_992.0;
+    let factor = 10_f64.powi(decimals.into());
+    floats.try_unary(|value| {
+        let scaled = value * factor;
+        let rounded = if value < 0.0 { 0.0 - (0.5 - scaled).floor() } else { (scaled + 0.5).floor() };
+        #[expect(clippy::cast_possible_truncation, reason = "a whole number below 2^53")]
+        if rounded.abs() < LARGEST { Ok(rounded as i64) } else { Err(ArrowError::CastError(value.to_string())) }
+    })
+}
+
 pub(crate) fn numbers(array: ArrayRef, ty: Type) -> Vector {
     match ty {
         Type::Float => array.as_primitive::<Float64Type>().unary::<_, Float64Type>(canonical).into(),
@@ -66,7 +78,6 @@ pub(crate) fn case(branches: &[(&Vector, &Vector)], otherwise: &Vector, ty: Type
     })
 }
 
-/// The first value that is not null.
 pub(crate) fn coalesce(values: &[&Vector], ty: Type) -> Result<Vector, ArrowError> {
     let (last, before) = values.split_last().expect("the binder has seen an argument at least");
     before.iter().rev().try_fold((*last).clone(), |result, values| {

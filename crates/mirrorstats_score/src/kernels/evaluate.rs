@@ -10,7 +10,7 @@ use arrow::datatypes::{DataType, Int64Type};
 use arrow::error::ArrowError;
 
 use crate::error::{EngineError, StepError};
-use crate::kernels::elementwise::{arithmetic, case, coalesce, compare, divide, numbers};
+use crate::kernels::elementwise::{arithmetic, case, coalesce, compare, divide, numbers, scale};
 use crate::kernels::segments::{Segments, repeat, repeat_bool, test_symbols, truths};
 use crate::kernels::vectors::{Symbols, Vector};
 use crate::physical::{Kernel, Metric, PhysicalPlan, Scores, Shape, Step, StepId};
@@ -42,9 +42,9 @@ pub struct BatchScores {
 impl PhysicalPlan {
     pub fn evaluate(&self, batch: &Batch) -> Result<Evaluated, EngineError> {
         self.check_batch(batch.segments.rows(), batch.segments.len())?;
-        let vectors = Vec::with_capacity(self.steps().len());
+        let vectors = Vec::with_capacity(self.steps.len());
         let mut evaluation = Evaluation { plan: self, batch, symbols: Symbols::default(), vectors };
-        for (at, step) in self.steps().iter().enumerate() {
+        for (at, step) in self.steps.iter().enumerate() {
             let vector = evaluation.step(StepId(at), step).map_err(|error| self.error(StepId(at), error))?;
             evaluation.vectors.push(vector);
         }
@@ -55,8 +55,13 @@ impl PhysicalPlan {
         match error {
             StepError::Engine(error) => error,
             StepError::Kernel(reason) => {
-                let metric = self.metric_of(at).unwrap_or("the filter").to_owned();
-                EngineError::Overflow { metric, reason: reason.to_string() }
+                let metric = self.metrics.get(&at).map_or("the filter", String::as_str).to_owned();
+                match (reason, &self.steps[at.0].kernel) {
+                    (ArrowError::CastError(value), Kernel::Scale(_, decimals)) => {
+                        EngineError::NotADecimal { metric, value, decimals: *decimals }
+                    }
+                    (reason, _) => EngineError::Overflow { metric, reason: reason.to_string() },
+                }
             }
         }
     }
@@ -90,7 +95,7 @@ impl Evaluated {
     }
 
     pub(crate) fn of(&self, id: StepId) -> &Vector {
-        &self.vectors[id.index()]
+        &self.vectors[id.0]
     }
 
     pub(crate) fn text(&self, symbol: u32) -> &str {
@@ -118,7 +123,7 @@ impl Datum for Operand<'_> {
 
 impl Evaluation<'_> {
     fn of(&self, id: StepId) -> &Vector {
-        &self.vectors[id.index()]
+        &self.vectors[id.0]
     }
 
     fn operand(&self, id: StepId) -> Operand<'_> {
@@ -233,7 +238,7 @@ impl Evaluation<'_> {
     fn elementwise(&self, id: StepId, kernel: &Kernel, ty: Type) -> Result<Vector, ArrowError> {
         let segments = self.batch.segments;
         let bools = |id: StepId| self.of(id).bools();
-        let matches = |symbol| self.plan.pattern(id).is_match(self.symbols.text(symbol));
+        let matches = |symbol| self.plan.patterns[&id].is_match(self.symbols.text(symbol));
         Ok(match kernel {
             Kernel::Symbols(keys) => self.of(*keys).keyed().symbols().into(),
             Kernel::KeysEqualText { keys, text, equal } => {
@@ -272,6 +277,7 @@ impl Evaluation<'_> {
             Kernel::Coalesce(values) => coalesce(&values.iter().map(|id| self.of(*id)).collect::<Vec<_>>(), ty)?,
             Kernel::IntFromBool(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Int64)?),
             Kernel::FloatFromInt(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Float64)?),
+            Kernel::Scale(x, decimals) => scale(self.of(*x).floats(), *decimals)?.into(),
             _ => unreachable!("`step` evaluates the other kernels"),
         })
     }

@@ -104,6 +104,7 @@ impl<'a> Lowering<'a> {
             Op::Matches(x, pattern) => self.matches(*x, pattern, at),
             Op::IntFromBool(x) => Kernel::IntFromBool(self.node(*x, at)),
             Op::FloatFromInt(x) => Kernel::FloatFromInt(self.node(*x, at)),
+            Op::Scale(x, decimals) => Kernel::Scale(self.node(*x, at), *decimals),
             Op::Spread(_) | Op::Compare(..) | Op::Case { .. } | Op::Aggregate(..) | Op::At(..) | Op::Lag(_) => {
                 unreachable!("these have functions of their own")
             }
@@ -121,17 +122,8 @@ impl<'a> Lowering<'a> {
 
     fn full(&mut self, id: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
         let step = self.plain(id, at);
-        self.written_out(step, shape)
-    }
-
-    fn written_out(&mut self, step: StepId, shape: Shape) -> StepId {
-        match self.physical.step(step) {
-            of if of.shape == Shape::One => {
-                let ty = of.ty;
-                self.physical.push(Kernel::Repeat(step), ty, shape)
-            }
-            _ => step,
-        }
+        let (ty, from) = (self.physical.step(step).ty, self.physical.step(step).shape);
+        if from == Shape::One { self.physical.push(Kernel::Repeat(step), ty, shape) } else { step }
     }
 
     fn gives_keys(&self, step: StepId) -> bool {

@@ -20,12 +20,6 @@ use mirrorstats_metric::logical_plan::plan::{Aggregate, Arithmetic, Comparison, 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StepId(pub(super) usize);
 
-impl StepId {
-    pub(super) const fn index(self) -> usize {
-        self.0
-    }
-}
-
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Shape {
     One,
@@ -94,6 +88,7 @@ pub enum Kernel {
     SymbolsMatch(StepId, String),
     IntFromBool(StepId),
     FloatFromInt(StepId),
+    Scale(StepId, u8),
     /// The rows of each episode that are in all these windows, which compare the timestep with moments; empty if a
     /// moment is null. Gives ranges of rows, not values.
     Within(Vec<(Comparison, StepId)>),
@@ -136,6 +131,7 @@ impl Kernel {
             | Self::SymbolsMatch(x, _)
             | Self::IntFromBool(x)
             | Self::FloatFromInt(x)
+            | Self::Scale(x, _)
             | Self::Fold(_, x)
             | Self::Lag(x) => vec![*x],
             Self::And(x, y)
@@ -175,11 +171,13 @@ pub struct Scores {
 
 #[derive(Clone, Debug, Default)]
 pub struct PhysicalPlan {
-    steps: Vec<Step>,
+    pub(crate) steps: Vec<Step>,
     known: HashMap<Step, StepId>,
-    patterns: HashMap<StepId, Regex>,
-    metrics: HashMap<StepId, String>,
-    scores: Vec<Scores>,
+    pub(crate) patterns: HashMap<StepId, Regex>,
+    /// The metric that is reported for an error of a step.
+    pub(crate) metrics: HashMap<StepId, String>,
+    /// The outputs of each set of definitions, in the order in which they were added.
+    pub scores: Vec<Scores>,
 }
 
 impl PhysicalPlan {
@@ -206,15 +204,6 @@ impl PhysicalPlan {
         nodes.into_iter().map(|node| lowering.values(node)).collect()
     }
 
-    /// The outputs of each set of definitions, in the order in which they were added.
-    pub fn scores(&self) -> &[Scores] {
-        &self.scores
-    }
-
-    pub fn steps(&self) -> &[Step] {
-        &self.steps
-    }
-
     pub fn step(&self, id: StepId) -> &Step {
         &self.steps[id.0]
     }
@@ -229,14 +218,6 @@ impl PhysicalPlan {
             }
         }
         (timesteps, episodes)
-    }
-
-    pub(super) fn pattern(&self, id: StepId) -> &Regex {
-        &self.patterns[&id]
-    }
-
-    pub(super) fn metric_of(&self, step: StepId) -> Option<&str> {
-        self.metrics.get(&step).map(String::as_str)
     }
 
     fn push(&mut self, kernel: Kernel, ty: Type, shape: Shape) -> StepId {
@@ -266,9 +247,9 @@ mod tests {
     }
 
     fn printed(plan: &PhysicalPlan) -> String {
-        let steps = plan.steps().iter().enumerate();
+        let steps = plan.steps.iter().enumerate();
         let steps = steps.map(|(at, step)| format!("%{at} {:?} {:?} {:?}\n", step.ty, step.shape, step.kernel));
-        steps.chain(plan.scores().iter().map(|scores| format!("{scores:?}\n"))).collect()
+        steps.chain(plan.scores.iter().map(|scores| format!("{scores:?}\n"))).collect()
     }
 
     #[test]
@@ -283,10 +264,10 @@ mod tests {
         let alone = PhysicalPlan::of(&[&paper.plan]);
         let both = PhysicalPlan::of(&[&paper.plan, &filtered.plan]);
         // The column and the comparison; the paper's definitions already have the constant 1.
-        assert_eq!(both.steps().len(), alone.steps().len() + 2);
-        assert_eq!(both.scores()[0], alone.scores()[0]);
-        assert_eq!(both.scores()[1].metrics, alone.scores()[0].metrics);
-        assert!(both.scores()[1].filter.is_some());
+        assert_eq!(both.steps.len(), alone.steps.len() + 2);
+        assert_eq!(both.scores[0], alone.scores[0]);
+        assert_eq!(both.scores[1].metrics, alone.scores[0].metrics);
+        assert!(both.scores[1].filter.is_some());
     }
 
     #[test]

@@ -22,7 +22,7 @@ const fn most_work(bytes: u64) -> Limit {
 impl PhysicalPlan {
     /// Checks that the vectors of all steps fit into memory for this number of rows and episodes.
     pub(crate) fn check_batch(&self, rows: usize, episodes: usize) -> Result<(), Exceeded> {
-        let bits = self.steps().iter().fold(0_u64, |sum, step| {
+        let bits = self.steps.iter().fold(0_u64, |sum, step| {
             let values = if step.shape == Shape::Timesteps { rows } else { episodes };
             sum.saturating_add(bits_of(step).saturating_mul(values as u64))
         });
@@ -32,7 +32,7 @@ impl PhysicalPlan {
     /// Checks the work of all steps over this number of rows, of files of this size.
     pub(crate) fn check_work(&self, rows: u64, bytes: u64) -> Result<(), Exceeded> {
         let bits = |step: &Step| if step.shape == Shape::Timesteps { bits_of(step) } else { 0 };
-        let per_row = self.steps().iter().fold(0_u64, |sum, step| {
+        let per_row = self.steps.iter().fold(0_u64, |sum, step| {
             // `case` reads a branch value by value, whatever its type.
             let least = if matches!(step.kernel, Kernel::Case { .. } | Kernel::Coalesce(_)) {
                 bits(step).min(64) * 8

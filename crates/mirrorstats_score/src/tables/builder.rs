@@ -14,11 +14,11 @@ use arrow::datatypes::{ArrowNativeType as _, DataType, Float64Type, Int32Type, I
 
 use crate::tables::order::order;
 use crate::tables::table::{
-    EpisodeKey, EpisodeKeys, EpisodeTable, Header, KeyRef, LabelColumn, MetricColumn, MetricValues, TextColumn, narrow,
+    EpisodeKey, EpisodeKeys, EpisodeTable, Header, KeyRef, LabelColumn, MetricColumn, MetricValues, TextColumn,
+    default_text, narrow,
 };
 use mirrorstats_trace::footers::declared::Declared;
 use mirrorstats_trace::scan::{EPISODE_COLUMNS, EpisodeBatch};
-use mirrorstats_trace::schema::{self, Column};
 
 #[derive(Debug)]
 pub struct TableBuilder {
@@ -196,11 +196,6 @@ pub(crate) fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
     (0..dictionary.len()).map(text).collect()
 }
 
-pub(crate) fn default_text(name: &str) -> Option<&'static str> {
-    schema::column(name).and_then(Column::default_text)
-}
-
-/// A non-text value as text; `None` for null.
 fn shown(column: &ArrayRef, row: usize) -> Option<String> {
     if column.is_null(row) {
         return None;
@@ -214,7 +209,6 @@ fn shown(column: &ArrayRef, row: usize) -> Option<String> {
 }
 
 impl FromIterator<EpisodeKey> for EpisodeKeys {
-    /// Keys in order of arrival.
     fn from_iter<I: IntoIterator<Item = EpisodeKey>>(keys: I) -> Self {
         let mut columns = KeyBuilder::default();
         keys.into_iter().for_each(|key| columns.push(key.as_ref()));

@@ -3,17 +3,19 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, DictionaryArray, Int32Array, RecordBatch, StringArray};
+use arrow::array::{ArrayRef, AsArray as _, DictionaryArray, Int32Array, RecordBatch, StringArray};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Schema};
+use arrow::datatypes::{DataType, Decimal128Type, Field, Int64Type, Schema};
 use arrow::error::ArrowError;
 
 use crate::tables::table::{EpisodeTable, Header, TextColumn};
+use mirrorstats_metric::catalogs::catalog::Catalog;
 
 pub const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
 
 /// One row per episode, as `score` writes it: `episode_id`, `model`, `experiment` (text), `seed`, `run` (int32),
-/// further key columns (text, nullable), then one column per metric (int64; null if undefined, a rate is 0 or 1).
+/// further key columns (text, nullable), then one column per metric (int64; null if undefined, a rate is 0 or 1; a
+/// decimal with 18 digits where the metric has decimals).
 pub fn record_batch(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
     let schema = Arc::new(schema(&table.header()));
     let columns = (0..schema.fields().len()).map(|column| values(table, column, 0..table.len()));
@@ -25,8 +27,19 @@ pub(crate) fn schema(header: &Header) -> Schema {
     let keys = KEYS.iter().zip([DataType::Utf8, DataType::Utf8, DataType::Utf8, DataType::Int32, DataType::Int32]);
     let keys = keys.map(|(name, ty)| Field::new(*name, ty, false));
     let labels = header.labels.iter().map(|name| Field::new(name, DataType::Utf8, true));
-    let metrics = header.metrics.iter().map(|name| Field::new(name, DataType::Int64, true));
+    let metrics = header.metrics.iter().map(|name| Field::new(name, metric_type(&header.catalog, name), true));
     Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
+}
+
+/// The most digits of a stored value: those of 64 bits.
+const MOST_DIGITS: u8 = 18;
+
+/// The type of a metric's column: integers, or decimals with the digits of the metric.
+pub(crate) fn metric_type(catalog: &Catalog, metric: &str) -> DataType {
+    match catalog.metric.get(metric).map_or(0, |metric| metric.decimals) {
+        0 => DataType::Int64,
+        decimals => DataType::Decimal128(MOST_DIGITS, decimals.cast_signed()),
+    }
 }
 
 /// The texts of a column of the schema; `None` for a numeric column.
@@ -51,7 +64,14 @@ pub(crate) fn values(table: &EpisodeTable, column: usize, rows: Range<usize>) ->
         4 => number(&keys.run),
         other => {
             let metric = &metrics[other - KEYS.len() - labels.len()];
-            cast(&metric.array().slice(rows.start, rows.len()), &DataType::Int64)?
+            let stored = cast(&metric.array().slice(rows.start, rows.len()), &DataType::Int64)?;
+            match metric_type(&table.catalog, &metric.name) {
+                DataType::Decimal128(digits, decimals) => {
+                    let units = stored.as_primitive::<Int64Type>().unary::<_, Decimal128Type>(i128::from);
+                    Arc::new(units.with_precision_and_scale(digits, decimals)?)
+                }
+                _ => stored,
+            }
         }
     })
 }

@@ -7,6 +7,7 @@ use std::fmt::Debug;
 
 use indexmap::IndexMap;
 
+use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_metric::catalogs::catalog::{Catalog, Experiment, Kind};
@@ -92,7 +93,10 @@ fn resolved(declared: &DeclaredExperiment, catalog: &Catalog) -> Experiment {
 }
 
 fn no_share(file: &str, name: &str, experiment: &Experiment, catalog: &Catalog) -> Option<DeclarationError> {
-    let chance = experiment.chance.iter().filter_map(|(metric, level)| Some(("chance", metric, (*level)?)));
+    let chance = experiment.chance.iter();
+    let chance = chance.flat_map(|(metric, level)| {
+        level.iter().flat_map(Chance::levels).map(move |(_, level)| ("chance", metric, level))
+    });
     let reference = experiment.reference.iter();
     let reference =
         reference.flat_map(|(metric, levels)| levels.iter().map(move |level| ("reference", metric, *level)));
@@ -123,7 +127,7 @@ fn difference(one: &Experiment, other: &Experiment) -> Option<(String, String, S
         let words = |order: i64| if order == LAST { "not given".to_owned() } else { order.to_string() };
         return Some(("order".to_owned(), words(one.order), words(other.order)));
     }
-    differing_level("chance", &one.chance, &other.chance, |level| spelled(*level))
+    differing_level("chance", &one.chance, &other.chance, |level| spelled(level.as_ref()))
         .or_else(|| differing_level("reference", &one.reference, &other.reference, |levels| listed(levels)))
 }
 
@@ -139,8 +143,8 @@ fn differing_level<T: PartialEq + Debug>(
     Some((format!("{kind} level of {}", visible(metric)), of(one), of(other)))
 }
 
-pub fn spelled(level: Option<Ratio>) -> String {
-    level.map_or_else(|| "none".to_owned(), |level| level.to_string())
+pub fn spelled(level: Option<&Chance>) -> String {
+    level.map_or_else(|| "none".to_owned(), ToString::to_string)
 }
 
 pub fn listed(levels: &[Ratio]) -> String {

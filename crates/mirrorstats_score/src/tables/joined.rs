@@ -2,9 +2,11 @@
 
 use std::collections::HashSet;
 
-use crate::tables::builder::{TableBuilder, default_text};
+use crate::tables::builder::TableBuilder;
 use crate::tables::order::order;
-use crate::tables::table::{EpisodeKeys, EpisodeTable, Header, JoinError, LOST, TextColumn, UNUSABLE_REPLIES};
+use crate::tables::table::{
+    EpisodeKeys, EpisodeTable, Header, JoinError, LOST, TextColumn, UNUSABLE_REPLIES, default_text,
+};
 use mirrorstats_trace::schema;
 
 impl EpisodeTable {

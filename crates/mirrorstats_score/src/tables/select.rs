@@ -48,7 +48,7 @@ pub fn select(
     if let Some(names) = metrics {
         let known: Vec<String> = table.metrics.iter().map(|metric| metric.name.clone()).collect();
         if let Some(name) = names.iter().find(|name| !known.contains(name)) {
-            return Err(UnknownMetric::new(name, known).into());
+            return Err(UnknownMetric::new(name, &known).into());
         }
         table.metrics.retain(|metric| names.contains(&metric.name));
     }
@@ -77,12 +77,11 @@ fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, Selec
     )?;
     let batch = Batch { segments: Segments::new(&offsets), steps: &steps, texts: &[], episodes: &episodes };
     let plan = PhysicalPlan::of(&[&definitions.plan]);
-    let kept = plan.evaluate(&batch)?.scores(&plan.scores()[0])?.kept;
+    let kept = plan.evaluate(&batch)?.scores(&plan.scores[0])?.kept;
     let kept: Vec<usize> = kept.iter().flat_map(|kept| kept.values().set_indices()).collect();
     Ok(table.taken(&kept))
 }
 
-/// Returns true if a column holds coders' labels, as true and false.
 pub fn is_of_coders(label: &LabelColumn) -> bool {
     label.name.starts_with(labels::PREFIX) && label.values.iter().flatten().all(|text| matches!(text, "true" | "false"))
 }

@@ -8,10 +8,11 @@ use arrow::array::{
 };
 use arrow::compute::take;
 
-use super::builder::default_text;
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::Catalog;
 pub use mirrorstats_trace::footers::declared::Declared;
+use mirrorstats_trace::schema::{self, Column};
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
 #[derive(Clone, Debug, PartialEq)]
@@ -30,11 +31,11 @@ pub struct EpisodeTable {
 
 #[derive(Clone, Debug)]
 pub struct EpisodeKeys {
-    pub(crate) experiment: TextColumn,
-    pub(crate) model: TextColumn,
+    pub experiment: TextColumn,
+    pub model: TextColumn,
     pub(crate) seed: Int32Array,
     pub(crate) run: Int32Array,
-    pub(crate) episode_id: TextColumn,
+    pub episode_id: TextColumn,
 }
 
 /// The label of the factor that a study varies besides the model.
@@ -73,29 +74,21 @@ impl UnusableCount {
 }
 
 /// The key of an episode. The derived order is the order of the table.
-#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct EpisodeKey {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct EpisodeKey<T = String> {
     /// `E1`..`E5` in the paper.
-    pub experiment: String,
+    pub experiment: T,
     /// The model's name in tables.
-    pub model: String,
+    pub model: T,
     /// The seed of the block of runs.
     pub seed: i32,
     /// The run within the seed.
     pub run: i32,
     /// Unique in a report.
-    pub episode_id: String,
+    pub episode_id: T,
 }
 
-/// An [`EpisodeKey`] in a table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct KeyRef<'a> {
-    pub experiment: &'a str,
-    pub model: &'a str,
-    pub seed: i32,
-    pub run: i32,
-    pub episode_id: &'a str,
-}
+pub type KeyRef<'a> = EpisodeKey<&'a str>;
 
 /// A text column: a code per row, null without text, and the text of each code.
 #[derive(Clone, Debug)]
@@ -169,6 +162,12 @@ impl EpisodeTable {
         self.labels.iter().find(|label| label.name == name).map(|label| &label.values)
     }
 
+    /// A value in the metric's unit, exactly; `None` if the metric is undefined.
+    pub fn decimal(&self, column: &MetricColumn, row: usize) -> Option<Decimal> {
+        let digits = self.catalog.metric.get(&column.name).map_or(0, |metric| metric.decimals);
+        Some(Decimal::of_units(column.get(row)?.into(), digits.into()))
+    }
+
     /// The metric of this name, if the table has it.
     pub fn metric(&self, name: &str) -> Option<&MetricColumn> {
         self.metrics.iter().find(|metric| metric.name == name)
@@ -198,6 +197,11 @@ impl EpisodeTable {
     }
 }
 
+/// The meaning of a missing value of a column of the schema.
+pub(crate) fn default_text(name: &str) -> Option<&'static str> {
+    schema::column(name).and_then(Column::default_text)
+}
+
 pub(crate) fn narrow(row: usize) -> u32 {
     u32::try_from(row).expect("2^32 episodes do not fit into memory")
 }
@@ -224,27 +228,12 @@ impl EpisodeKeys {
 
     /// Returns true if other columns have the same key in each row. May return false if keys are encoded differently.
     pub fn has_keys_of(&self, other: &Self) -> bool {
-        let is_same = |of: fn(&Self) -> &TextColumn| {
-            let (a, b) = (of(self), of(other));
-            a.codes == b.codes && a.texts == b.texts
-        };
+        let is_same = |a: &TextColumn, b: &TextColumn| a.codes == b.codes && a.texts == b.texts;
         self.seed == other.seed
             && self.run == other.run
-            && is_same(|keys| &keys.experiment)
-            && is_same(|keys| &keys.model)
-            && is_same(|keys| &keys.episode_id)
-    }
-
-    pub fn experiments(&self) -> &TextColumn {
-        &self.experiment
-    }
-
-    pub fn models(&self) -> &TextColumn {
-        &self.model
-    }
-
-    pub fn episode_ids(&self) -> &TextColumn {
-        &self.episode_id
+            && is_same(&self.experiment, &other.experiment)
+            && is_same(&self.model, &other.model)
+            && is_same(&self.episode_id, &other.episode_id)
     }
 
     pub fn seed(&self, row: usize) -> i32 {
@@ -312,7 +301,6 @@ impl TextColumn {
         self.codes.is_valid(row).then(|| self.codes.value(row) as usize)
     }
 
-    /// The bytes of the longest text; 0 without one.
     pub(crate) fn longest(&self) -> usize {
         let offsets = self.texts.value_offsets().windows(2);
         let longest = offsets.map(|ends| ends[1] - ends[0]).max().unwrap_or_default();

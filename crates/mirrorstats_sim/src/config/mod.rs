@@ -4,6 +4,8 @@
 //! Rule: a loaded configuration is valid; unknown keys, wrong types, values out of range and inconsistent keys are
 //! rejected. The hash covers the values, not the text.
 
+mod experiment;
+
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
@@ -15,8 +17,8 @@ use toml::Value;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::input;
-use mirrorstats_experiment::Spec;
-use mirrorstats_experiment::spec::{Body, CameraKind, Cubes, Look, Occluders, Others, is_default};
+use mirrorstats_experiment::angle::sine_cosine;
+use mirrorstats_experiment::spec::{Body, Look, is_default};
 use mirrorstats_toml_spec::{At, Fault, Faults, Shape, Source, lay};
 
 const DEFAULT: &str = include_str!("../../../../assets/world/default.toml");
@@ -209,7 +211,7 @@ pub struct OthersConfig {
     /// Of their steps, m.
     #[schemars(range(min = 0.05, max = 0.6))]
     pub step_length: f64,
-    /// Of a hundred episodes, those where one of them has the colour of the agent's own body.
+    /// Of a hundred others, those in the colour of a candidate, each candidate equally often; the rest have any colour.
     #[schemars(range(min = 0, max = 100))]
     pub twin_percent: u32,
     /// Ticks that one waits for a body in its way before it turns away.
@@ -281,6 +283,15 @@ pub enum ConfigError {
     Faults(#[from] Faults),
 }
 
+impl EyeConfig {
+    /// Half of the width and of the height of the view at one metre, m.
+    pub(crate) fn half_extent(&self) -> [f64; 2] {
+        let (sine, cosine) = sine_cosine(self.fovy / 2.0);
+        let high = sine / cosine;
+        [high * f64::from(self.width) / f64::from(self.height_px), high]
+    }
+}
+
 impl Default for WorldConfig {
     fn default() -> Self {
         DEFAULT_CONFIG.clone()
@@ -303,7 +314,6 @@ impl WorldConfig {
         Ok(Self::read(Source { name: path.display().to_string(), text })?)
     }
 
-    /// The default, overridden by the values of `text`.
     pub fn from_toml(text: &str) -> Result<Self, Faults> {
         Self::read(Source { name: "world configuration".to_owned(), text: text.to_owned() })
     }
@@ -352,54 +362,11 @@ impl WorldConfig {
         limits.into_iter().filter_map(fault).collect()
     }
 
-    /// The world for an experiment, whose lengths and counts override this configuration.
-    #[must_use]
-    pub fn for_experiment(&self, experiment: &Spec) -> Self {
-        let mut world = self.clone();
-        let put = |place: &mut u32, value: Option<u32>| *place = value.unwrap_or(*place);
-        put(&mut world.episode.steps, experiment.steps);
-        if let Some(millimetres) = experiment.step_length_mm {
-            world.body.step_length = metres(millimetres);
-        }
-        if let Some(picture) = experiment.view {
-            (world.eye.width, world.eye.height_px) = (picture.width, picture.height);
-            world.eye.fovy = f64::from(picture.fovy);
-        }
-        world.look = experiment.look;
-        world.body.shape = experiment.body.unwrap_or(world.body.shape);
-        if experiment.camera == CameraKind::Behind {
-            (world.eye.forward, world.eye.height, world.eye.pitch) = BEHIND;
-        }
-        let Others { least, most, twin_percent, .. } = experiment.layout.others;
-        put(&mut world.others.least, least);
-        put(&mut world.others.most, most);
-        put(&mut world.others.twin_percent, twin_percent);
-        world.others.least = world.others.least.min(world.others.most);
-        if let Cubes::Clutter { least, most, hides, occluders } = experiment.layout.cubes {
-            if occluders == Occluders::Random {
-                (world.clutter.hides_percent, world.clutter.stack_percent) = (0, 0);
-            }
-            put(&mut world.clutter.hides_percent, hides);
-            put(&mut world.clutter.least, least);
-            put(&mut world.clutter.most, most);
-            world.clutter.least = world.clutter.least.min(world.clutter.most);
-        }
-        world
-    }
-
     /// SHA-256 of the values, 64 hexadecimal digits: the same for files with equal values.
     pub fn hash(&self) -> String {
         hash::of_bytes(serde_json::json!(self).to_string().as_bytes())
     }
-
-    pub fn view_px(&self) -> usize {
-        self.eye.width as usize * self.eye.height_px as usize
-    }
 }
-
-/// The camera behind the body: ahead of its axis and above the floor, m, and below the horizon, degrees. The slope
-/// leads to a point 1.7 m above the body's spot, 0.3 m down on 1.1 m ahead, with no more digits than recordings keep.
-const BEHIND: (f64, f64, f64) = (-1.1, 2.0, 15.255_118_7);
 
 pub fn metres(millimetres: u32) -> f64 {
     f64::from(millimetres) / 1000.0

@@ -9,7 +9,7 @@ use super::{AGENTS, BARS, Item, Sight, group, numbered, shadow};
 use crate::scene::MOST_CUBES;
 use mirrorstats_experiment::angle::{Heading, Quaternion};
 use mirrorstats_experiment::spec::{MOST_MARKS, PaneKind};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// Half the depth of a pane, m.
 const HALF_DEPTH: f64 = 0.000_05;
@@ -21,10 +21,7 @@ const BLANK: [u8; 3] = [128, 132, 138];
 const WALLS: [&str; 4] = ["wall_east", "wall_north", "wall_west", "wall_south"];
 
 pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, scene: &Scene, look: Sight) {
-    let pane = match look {
-        Sight::Direct => None,
-        Sight::Through(at) => Some((at, &scene.panes[at])),
-    };
+    let pane = look.pane(scene);
     let is_window = pane.is_some_and(|(_, pane)| pane.kind == PaneKind::Window);
     let neutral = BodyModel::new(config.body.shape).neutral_parts;
     for (geom, item) in items.iter().enumerate() {
@@ -58,11 +55,12 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
     }
 }
 
-pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, look: Sight) {
-    let pane = match look {
-        Sight::Direct => None,
-        Sight::Through(at) => Some(&scene.panes[at]),
-    };
+/// Shows the marks and the panes of a step, counted from 1.
+pub(super) fn show_at(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, look: Sight) {
+    let pane = look.pane(scene).map(|(_, pane)| pane);
+    if look == Sight::Direct {
+        show_panes(model, items, scene, t);
+    }
     for (geom, item) in items.iter().enumerate() {
         let Item::Mark(at) = *item else { continue };
         let Some(mark) = scene.marks.get(at) else { continue };
@@ -74,6 +72,19 @@ pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: 
         };
         if model.geom_rgba()[geom][1] != LABEL_GREEN {
             model.geom_rgba_mut()[geom] = paint(mark.color.rgb());
+        }
+    }
+}
+
+fn show_panes(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32) {
+    for (geom, item) in items.iter().enumerate() {
+        let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+        let shown = match *item {
+            Item::Pane(at) => scene.panes.get(at),
+            _ => numbered(name, FRAME).and_then(|bar| scene.panes.get(bar / BARS)).filter(|pane| pane.frame),
+        };
+        if let Some(pane) = shown {
+            model.geom_group_mut()[geom] = if pane.is_shown_at(t) { group::ROOM } else { group::HIDDEN };
         }
     }
 }
@@ -167,13 +178,16 @@ fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &Worl
 }
 
 /// Half of the width of a frame's bars, m.
-const HALF_BAR: f64 = 0.03;
+pub(crate) const HALF_BAR: f64 = 0.03;
+
+/// The prefix of the names of a frame's bars.
+pub(super) const FRAME: &str = "frame";
 
 /// Puts a frame's bar beside its pane, flush with it, so that it hides nothing; only direct views show frames.
 fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Sight, config: &WorldConfig) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
-    let Some(number) = numbered(name, "frame") else { return };
-    let pane = scene.panes.get(number / BARS).filter(|_| look == Sight::Direct);
+    let Some(number) = numbered(name, FRAME) else { return };
+    let pane = scene.panes.get(number / BARS).filter(|pane| pane.frame && look == Sight::Direct);
     let Some(pane) = pane else { return hide(model, geom) };
     let [x, y] = pane.place.center(config);
     let [out_x, out_y] = pane.place.heading().direction();
@@ -195,7 +209,6 @@ fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Sight, config: &
     model.geom_rgba_mut()[geom] = paint(WOOD);
 }
 
-/// The paint of a frame.
 const WOOD: [u8; 3] = [88, 66, 48];
 
 fn facing_inwards(heading: Heading) -> Quaternion {

@@ -6,20 +6,27 @@
 use super::super::body::Pose;
 use super::super::config::{WorldConfig, metres};
 use super::super::hand::HandRules;
+use super::super::model::HALF_BAR;
 use super::super::rng::Rng;
-use super::super::scene::{HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, Scene, WornMark, floor_plan};
+use super::super::scene::{
+    HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, Scene, WornMark, floor_plan, manhattan,
+};
+use super::balance::strange_colors;
 use super::{Drawing, is_in_view};
 use mirrorstats_experiment::angle::{HEADINGS, Heading};
 use mirrorstats_experiment::spec::{
-    BodyShown, Hand, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer,
+    BodyShown, Hand, Look, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer,
 };
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The maximum number of draws for a pane to be out of view at the start.
 const PLACES: u32 = 40;
 
 /// The maximum number of draws for a hand to be free and at the required distance.
 const STARTS: u32 = 2000;
+
+/// Between two panes on one wall, for the bars of their frames, m.
+const BETWEEN: f64 = 4.0 * HALF_BAR;
 
 /// Separates this stream from the layout's.
 const PURPOSE: u64 = 0x7061_6e65_7300;
@@ -40,32 +47,46 @@ pub(super) struct Extras {
 }
 
 impl PaneLayout<'_> {
-    pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
+    /// The draws; an error is the index of a pane without room beside others on its wall.
+    pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Result<Extras, usize> {
         let stream = |at: u64| Rng::for_run(purpose ^ (PURPOSE + at), seed, run);
         // Separate streams, so that an unused one does not affect the others.
-        let mut marks: Vec<WornMark> = Vec::new();
-        for (at, mark) in (16_u64..).zip(&self.scene.experiment.marks) {
-            marks.extend(self.worn(*mark, &marks, &mut stream(at)));
-        }
+        let marks = self.marks(stream);
         let hand = self.scene.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
         let mut others = stream(0);
         let another = match hand {
             Some(hand) => self.color_beside(hand, &marks, &mut others),
             None => self.another_color(&mut others),
         };
-        let any = self.any_other_color(&mut others);
+        // A window is no mirror, and a prompt is read at once: neither may point at a candidate.
+        let strange = others.one_of(&strange_colors(self.scene));
         let stated_color = match self.scene.experiment.stated_color {
             Stated::None => None,
             Stated::Candidate => Some(another),
-            Stated::Random => Some(any),
+            Stated::Random => Some(strange),
         };
         let mut panes = Vec::new();
         for (at, pane) in (1_u64..).zip(&self.scene.experiment.panes) {
             let mut chance = stream(at);
-            let place = if panes.is_empty() { self.scene.mirror } else { self.place(pane, &panes, &mut chance) };
-            panes.push(self.hung(pane, place, another, &mut chance));
+            let place = if panes.is_empty() { self.scene.mirror } else { self.place(pane, &panes, &mut chance)? };
+            let other = if pane.kind == PaneKind::Window { strange } else { another };
+            panes.push(self.hung(pane, place, other, &mut chance));
         }
-        Extras { stated_color, panes, marks, hand }
+        Ok(Extras { stated_color, panes, marks, hand })
+    }
+
+    /// The marks in the order of the experiment. Those on others are drawn first: they are visible without a mirror, so
+    /// they must not depend on the own one.
+    fn marks(&self, stream: impl Fn(u64) -> Rng) -> Vec<WornMark> {
+        let mut marks: Vec<(u64, Mark)> = (16_u64..).zip(self.scene.experiment.marks.iter().copied()).collect();
+        marks.sort_by_key(|(_, mark)| mark.on == Wearer::Own);
+        let mut worn: Vec<(u64, WornMark)> = Vec::new();
+        for (at, mark) in marks {
+            let before: Vec<Color> = worn.iter().map(|(_, mark)| mark.color).collect();
+            worn.extend(self.worn(mark, &before, &mut stream(at)).map(|mark| (at, mark)));
+        }
+        worn.sort_by_key(|(at, _)| *at);
+        worn.into_iter().map(|(_, mark)| mark).collect()
     }
 
     /// A hand in neither the body's nor its mark's colour, which starts on the near side of the mirror, outside the
@@ -84,9 +105,8 @@ impl PaneLayout<'_> {
             from_mark: [chance.between(2, 6), chance.between(-5, 5), chance.between(-4, 5)],
         };
         let fits = |hand: &HandStart| {
-            let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
             let is_there = HandRules { task, patch, hand: *hand, config: self.config, body: self.scene.start };
-            (task.least..=task.most).contains(&steps) && is_there.is_free(hand.from_mark)
+            (task.least..=task.most).contains(&manhattan(hand.from_mark)) && is_there.is_free(hand.from_mark)
         };
         (0..STARTS).map(|_| draw(chance)).find(fits)
     }
@@ -107,18 +127,26 @@ impl PaneLayout<'_> {
         chance.one_of(&self.other_colors(|_| true))
     }
 
-    /// The free colours of the palette, without that of the body.
     fn other_colors(&self, is_free: impl Fn(Color) -> bool) -> Vec<Color> {
         let palette = self.scene.experiment.layout.palette.iter().copied();
         palette.filter(|color| *color != self.scene.body_color && is_free(*color)).collect()
     }
 
-    fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> MirrorPlace {
+    fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> Result<MirrorPlace, usize> {
         let first = before[0].place.wall;
-        let fixed = if pane.wall == Wall::Opposite { Some((first + 2) % 4) } else { pane.wall.quarter() };
+        let fixed = match pane.wall {
+            Wall::Opposite => Some((first + 2) % 4),
+            Wall::Same => Some(first),
+            wall => wall.quarter(),
+        };
         let free: Vec<u8> = (0..4).filter(|wall| before.iter().all(|other| other.place.wall != *wall)).collect();
         let config = self.config;
         let width = pane.width_mm.map_or(config.mirror.width, metres);
+        if let Some(wall) = fixed.filter(|wall| !free.contains(wall)) {
+            let offsets = self.beside(wall, width, before);
+            let offset = (!offsets.is_empty()).then(|| chance.one_of(&offsets)).ok_or(before.len())?;
+            return Ok(MirrorPlace { wall, offset });
+        }
         let slack = (config.room.size / 2.0 - width / 2.0 - config.placement.wall_margin).max(0.0);
         let mut draw = || {
             let wall = fixed.unwrap_or_else(|| chance.one_of(&free));
@@ -126,10 +154,23 @@ impl PaneLayout<'_> {
         };
         let last = draw();
         let unseen = |place: &MirrorPlace| !is_in_view(config, *place, self.scene.start);
-        if unseen(&last) { last } else { (0..PLACES).map(|_| draw()).find(unseen).unwrap_or(last) }
+        Ok(if unseen(&last) { last } else { (0..PLACES).map(|_| draw()).find(unseen).unwrap_or(last) })
     }
 
-    fn hung(&self, pane: &Pane, place: MirrorPlace, another: Color, chance: &mut Rng) -> HungPane {
+    /// The free places for a pane of this width on a wall, as offsets in whole centimetres.
+    fn beside(&self, wall: u8, width: f64, before: &[HungPane]) -> Vec<f64> {
+        let most = self.config.room.size / 2.0 - self.config.placement.wall_margin - width / 2.0;
+        let is_apart = |offset: f64, other: &HungPane| {
+            other.place.wall != wall
+                || (offset - other.place.offset).abs() >= f64::midpoint(width, other.width) + BETWEEN
+        };
+        // Half of the largest room is 6 m.
+        let offsets = (-600..=600).map(|offset| f64::from(offset) / 100.0);
+        let is_free = |offset: &f64| offset.abs() <= most && before.iter().all(|other| is_apart(*offset, other));
+        offsets.filter(is_free).collect()
+    }
+
+    fn hung(&self, pane: &Pane, place: MirrorPlace, other: Color, chance: &mut Rng) -> HungPane {
         let mirror = &self.config.mirror;
         let room = &self.config.room;
         let width = pane.width_mm.map_or(mirror.width, metres);
@@ -141,7 +182,7 @@ impl PaneLayout<'_> {
         let center_height = center_height.clamp(height / 2.0, room.height - height / 2.0);
         let color = match pane.color {
             Paint::Own => self.scene.body_color,
-            Paint::Other => another,
+            Paint::Other => other,
             Paint::Named(color) => color,
         };
         let is_independent = pane.kind == PaneKind::Window || pane.body == BodyShown::Independent;
@@ -153,6 +194,9 @@ impl PaneLayout<'_> {
             center_height,
             delay: pane.delay,
             paint: (!is_independent && color != self.scene.body_color).then_some(color),
+            from_t: pane.from_t,
+            until_t: pane.until_t,
+            frame: pane.frame || self.scene.experiment.look == Look::Textured,
             double: is_independent.then(|| self.double(pane, place, color, chance)),
         }
     }
@@ -179,14 +223,17 @@ impl PaneLayout<'_> {
     }
 
     /// A mark on a body, in a colour other than its wearer's and the earlier marks'.
-    fn worn(&self, mark: Mark, before: &[WornMark], chance: &mut Rng) -> Option<WornMark> {
+    fn worn(&self, mark: Mark, before: &[Color], chance: &mut Rng) -> Option<WornMark> {
         let (wearer, body) = match mark.on {
             Wearer::Own => (0, self.scene.body_color),
             Wearer::Other => (1, self.scene.others.first()?.color),
         };
-        let is_free = |color: Color| color != body && color != self.scene.body_color;
-        let free = self.other_colors(is_free);
-        let unused = self.other_colors(|color| is_free(color) && before.iter().all(|other| other.color != color));
+        let is_free = |color: Color| color != body;
+        let colors = |is_free: &dyn Fn(Color) -> bool| {
+            let palette = self.scene.experiment.layout.palette.iter().copied();
+            palette.filter(|color| is_free(*color)).collect::<Vec<_>>()
+        };
+        let (free, unused) = (colors(&is_free), colors(&|color| is_free(color) && !before.contains(&color)));
         let drawn = if unused.is_empty() { &free } else { &unused };
         let color = match mark.color {
             MarkColor::Named(color) if is_free(color) => color,

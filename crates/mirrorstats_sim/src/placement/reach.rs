@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use super::super::config::WorldConfig;
 use super::super::floor::FloorPlan;
 use super::super::scene::{Cube, Scene};
-use super::Occlusion;
 use mirrorstats_experiment::spec::Cubes;
 
 /// The distance between points of the floor's lattice, m.
@@ -25,31 +24,34 @@ const ENOUGH: f64 = 0.75;
 /// episode each. Clutter, if any, must hide at least half of the body from the required share of places before the
 /// mirror (paper, section 3: mirror evidence in E5 is partial or occluded).
 pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
-    let near = near(config, scene, plan);
-    let shares = shares(config, scene, &near);
-    let Occlusion { places, hidden, .. } = Occlusion::of_shares(&shares);
+    let near = within(config, scene, f64::from(config.episode.steps) / 3.0).map(|at| spot(scene, at));
+    let near: Vec<[f64; 2]> = near.collect();
+    let shares: Vec<f64> = near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect();
+    let hidden = shares.iter().filter(|share| **share <= 0.5).count();
     let has_clutter = matches!(scene.experiment.layout.cubes, Cubes::Clutter { .. }) && !scene.cubes.is_empty();
     let reaches =
         |cube: &Cube| near.iter().any(|spot| cube.square().distance(*spot) <= plan.radius + config.body.step_length);
     shares.iter().any(|share| *share >= ENOUGH)
-        && (!has_clutter || 100 * hidden >= config.clutter.hides_percent as usize * places)
+        && (!has_clutter || 100 * hidden >= config.clutter.hides_percent as usize * shares.len())
         && (!scene.experiment.has_candidates() || scene.cubes.iter().all(reaches))
 }
 
-/// The places that the agent can walk to within a third of the episode.
-fn near(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> Vec<[f64; 2]> {
-    let budget = f64::from(config.episode.steps) / 3.0 * config.body.step_length;
-    lengths(scene, plan).into_iter().filter(|(_, length)| *length <= budget).map(|(spot, _)| spot).collect()
+/// The points of the lattice that the agent can walk to within this number of steps.
+fn within(config: &WorldConfig, scene: &Scene, steps: f64) -> impl Iterator<Item = [i32; 2]> {
+    let found = lengths(scene, &scene.floor_plan(config)).into_iter();
+    let most = steps * config.body.step_length;
+    found.filter(move |(_, length)| *length <= most).map(|(at, _)| at)
 }
 
-/// The visible shares of the body in the mirror, from those of these places that are before it.
-fn shares(config: &WorldConfig, scene: &Scene, near: &[[f64; 2]]) -> Vec<f64> {
-    near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect()
+/// The places that the agent can walk to within the episode, every second one of the lattice in both directions.
+pub(crate) fn reachable(config: &WorldConfig, scene: &Scene) -> Vec<[f64; 2]> {
+    let found = within(config, scene, f64::from(config.episode.steps));
+    found.filter(|at| at.iter().all(|at| at % 2 == 0)).map(|at| spot(scene, at)).collect()
 }
 
-/// The occlusion by cubes, from the places before the mirror in a scene.
-pub(super) fn occlusion(config: &WorldConfig, scene: &Scene) -> Occlusion {
-    Occlusion::of_shares(&shares(config, scene, &near(config, scene, &scene.floor_plan(config))))
+/// Returns true if an agent here that faces the mirror squarely sees enough of its body.
+pub(super) fn is_clear(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> bool {
+    share_shown(config, scene, spot).is_some_and(|share| share >= ENOUGH)
 }
 
 /// The share of its body that an agent here sees when it faces the mirror squarely; `None` if the place is not before
@@ -60,9 +62,9 @@ fn share_shown(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> Option<f6
     let is_before = mirror.aside(spot).abs() <= config.mirror.width / 2.0 - 0.3 && away <= NEAR_ENOUGH;
     let points = || ACROSS.into_iter().flat_map(|across| HEIGHTS.into_iter().map(move |height| [across, height]));
     let hides = |cube: &Cube, point: [f64; 2]| is_hidden(config, scene, cube, spot, point);
-    let shown = points().filter(|point| !scene.cubes.iter().any(|cube| hides(cube, *point))).count();
+    let shown = || points().filter(|point| !scene.cubes.iter().any(|cube| hides(cube, *point))).count();
     #[expect(clippy::cast_precision_loss, reason = "a few points")]
-    is_before.then(|| shown as f64 / points().count() as f64)
+    is_before.then(|| shown() as f64 / points().count() as f64)
 }
 
 /// Returns true if a cube hides the point of the body at this place across it and this height from an agent who looks
@@ -80,20 +82,25 @@ fn is_hidden(config: &WorldConfig, scene: &Scene, cube: &Cube, spot: [f64; 2], [
         })
 }
 
-fn lengths(scene: &Scene, plan: &FloorPlan) -> Vec<([f64; 2], f64)> {
+/// A point of the lattice in the room.
+fn spot(scene: &Scene, at: [i32; 2]) -> [f64; 2] {
+    [scene.start.x + LATTICE * f64::from(at[0]), scene.start.y + LATTICE * f64::from(at[1])]
+}
+
+/// The points of the lattice that the agent can walk to, with the lengths of the ways.
+fn lengths(scene: &Scene, plan: &FloorPlan) -> Vec<([i32; 2], f64)> {
     let mut found = vec![([0_i32, 0_i32], 0.0)];
     let mut queue = VecDeque::from([0]);
-    let spot = |at: [i32; 2]| [scene.start.x + LATTICE * f64::from(at[0]), scene.start.y + LATTICE * f64::from(at[1])];
     let mut seen = std::collections::BTreeSet::from([[0, 0]]);
     while let Some(at) = queue.pop_front() {
         let (from, length) = found[at];
         for to in [[1, 0], [-1, 0], [0, 1], [0, -1]].map(|[right, up]| [from[0] + right, from[1] + up]) {
-            if !seen.contains(&to) && plan.is_passable(spot(from), spot(to)) {
+            if !seen.contains(&to) && plan.is_passable(spot(scene, from), spot(scene, to)) {
                 seen.insert(to);
                 queue.push_back(found.len());
                 found.push((to, length + LATTICE));
             }
         }
     }
-    found.into_iter().map(|(at, length)| (spot(at), length)).collect()
+    found
 }

@@ -17,7 +17,6 @@ struct Pass {
     depths: Vec<f64>,
 }
 
-/// Calls `each` with the codes of every row, from the top.
 pub(super) fn rows(world: &World, width: usize, height: usize, mut each: impl FnMut(&[u8])) {
     let view = RayView::of_eye(world, width, height);
     let mut direct = Pass::new(view, world.stage());
@@ -47,12 +46,11 @@ fn pane_code(pane: usize) -> u8 {
 
 impl Pass {
     fn new(view: RayView, stage: &Stage) -> Self {
-        let code = |item: Item| match stage.look() {
+        let code = |item: Item| match stage.look {
             Sight::Direct => Shown::Direct(item).code(),
             Sight::Through(pane) => Shown::Through(pane, item).code(),
         };
-        let shown =
-            stage.items().iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
+        let shown = stage.items.iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
         let parts = shown.map(|(geom, item)| SolidPart { code: code(*item), solid: solid(stage, geom) });
         let candidates = parts.filter_map(|part| Some(Candidate { part, rectangle: part.solid.rectangle(&view)? }));
         Self { view, candidates: candidates.collect(), depths: vec![f64::INFINITY; view.width] }

@@ -7,11 +7,12 @@ use super::super::model::Item;
 use super::super::scene::{HungPane, Scene};
 use super::view::Shown;
 use crate::world::World;
-use mirrorstats_experiment::spec::{MOST_MARKS, MOST_PANES, PaneKind, is_default};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_experiment::spec::{PaneKind, is_default};
+use mirrorstats_trace::episodes::episode::Extra;
+use mirrorstats_trace::schema::colors::Color;
 
 /// The visible pixels of one step, out of `view_px`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "Census")]
 pub struct Visibility {
@@ -150,38 +151,44 @@ impl Counts<'_> {
     }
 }
 
-const PANES: [&str; MOST_PANES] = ["pane1_body_px", "pane2_body_px", "pane3_body_px", "pane4_body_px"];
-const MARKS: [&str; MOST_MARKS] = ["mark1_px", "mark2_px", "mark3_px", "mark4_px"];
-
-/// The counts of a scene: those of panes if there are several, those of marks if the own body wears several.
-pub fn by_column(world: &World, seen: &Visibility) -> Vec<(&'static str, i32)> {
+/// Adds the columns of a step: those of panes if there are several, those of marks if the own body wears several.
+pub fn columns(world: &World, seen: &Visibility, others: Extra) -> Extra {
     let scene = world.scene();
-    let mut counts = vec![
-        ("mirror_self_px", seen.self_px),
-        ("mirror_other_px", seen.other_px),
-        ("mirror_px", seen.mirror_px),
-        ("direct_other_px", seen.direct_other_px),
-    ];
-    if world.has_own_mark() {
-        counts.push(("mirror_mark_px", seen.mark_px));
-    }
-    if scene.panes.iter().any(|pane| pane.double.is_some()) {
-        counts.push(("mirror_double_px", seen.double_px));
-    }
     // A pane shows the own body or another one, never both.
     let bodies: Vec<u32> = seen.panes.iter().map(|pane| pane.self_px + pane.double_px).collect();
-    if let Some(shown) = scene.shown_color() {
-        let colors = scene.panes.iter().map(|pane| pane.paint.or_else(|| pane.double.map(|double| double.color)));
-        let of_shown = colors.zip(&bodies).filter(|(color, _)| *color == Some(shown));
-        counts.push(("shown_px", of_shown.map(|(_, px)| px).sum()));
-    }
-    if scene.panes.len() > 1 {
-        counts.extend(PANES.into_iter().zip(bodies));
-    }
+    let shown = scene.shown_color().map(|shown| {
+        let colors = scene.panes.iter().map(HungPane::shown_color);
+        colors.zip(&bodies).filter(|(color, _)| *color == Some(shown)).map(|(_, px)| px).sum()
+    });
+    let has_double = scene.panes.iter().any(|pane| pane.double.is_some());
     let own = scene.marks.iter().zip(&seen.marks).filter(|(mark, _)| mark.wearer == 0);
     let marks: Vec<u32> = own.map(|(_, sighting)| sighting.mirror_px).collect();
-    if marks.len() > 1 {
-        counts.extend(MARKS.into_iter().zip(marks));
+    let [pane1_body_px, pane2_body_px, pane3_body_px, pane4_body_px] = several(&bodies);
+    let [mark1_px, mark2_px, mark3_px, mark4_px] = several(&marks);
+    Extra {
+        mirror_self_px: Some(narrow(seen.self_px)),
+        mirror_other_px: Some(narrow(seen.other_px)),
+        mirror_px: Some(narrow(seen.mirror_px)),
+        direct_other_px: Some(narrow(seen.direct_other_px)),
+        mirror_mark_px: world.has_own_mark().then(|| narrow(seen.mark_px)),
+        mirror_double_px: has_double.then(|| narrow(seen.double_px)),
+        shown_px: shown.map(narrow),
+        pane1_body_px,
+        pane2_body_px,
+        pane3_body_px,
+        pane4_body_px,
+        mark1_px,
+        mark2_px,
+        mark3_px,
+        mark4_px,
+        ..others
     }
-    counts.into_iter().map(|(column, px)| (column, i32::try_from(px).unwrap_or(i32::MAX))).collect()
+}
+
+fn several(counts: &[u32]) -> [Option<i32>; 4] {
+    [0, 1, 2, 3].map(|at| counts.get(at).filter(|_| counts.len() > 1).copied().map(narrow))
+}
+
+fn narrow(px: u32) -> i32 {
+    i32::try_from(px).unwrap_or(i32::MAX)
 }

@@ -10,17 +10,17 @@
 
 mod cast;
 mod count;
+mod places;
 mod shape;
 mod truths;
 mod view;
 
-pub use count::{PaneSighting, Sighting, Visibility, by_column};
-pub use view::Shown;
-
-use view::RayView;
+pub use count::{PaneSighting, Sighting, Visibility, columns};
+pub use places::SelfVisibility;
+pub use view::{RayView, Shown};
 
 use super::label_image::{LabelImage, Rectangle};
-use super::model::{Item, ModelError, PaintMode, Sight, Stage};
+use super::model::{Item, Stage};
 use super::world::World;
 
 impl World {
@@ -47,26 +47,17 @@ impl World {
 /// picture. The room always may.
 pub(crate) fn in_view(world: &World, stage: &Stage, size: [usize; 2], within: Rectangle) -> Vec<bool> {
     let view = RayView::of_eye(world, size[0], size[1]);
-    let view = match stage.look() {
-        Sight::Direct => view,
-        Sight::Through(pane) => view.through(world, &world.scene().panes[pane]),
-    };
+    let view = stage.look.pane(world.scene()).map_or(view, |(_, pane)| view.through(world, pane));
     let is_in_view = |(geom, item): (usize, &Item)| {
         *item == Item::Room
             || (stage.is_shown(geom)
                 && shape::solid(stage, geom).rectangle(&view).is_some_and(|rectangle| rectangle.meets(within)))
     };
-    stage.items().iter().enumerate().map(is_in_view).collect()
+    stage.items.iter().enumerate().map(is_in_view).collect()
 }
 
 pub fn labels(world: &World, width: usize, height: usize) -> LabelImage {
     let mut codes = Vec::with_capacity(width * height);
     cast::rows(world, width, height, |row| codes.extend_from_slice(row));
     LabelImage { width, height, codes }
-}
-
-/// The same by MuJoCo's own rays in a loop, fifty times slower: tests compare the counts with it.
-pub fn labels_by_mujoco(world: &World, width: usize, height: usize) -> Result<LabelImage, ModelError> {
-    let mut stages = world.stages(PaintMode::Lit)?;
-    Ok(view::by_mujoco(world, &mut stages, width, height))
 }

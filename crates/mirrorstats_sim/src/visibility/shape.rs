@@ -27,8 +27,8 @@ pub(super) fn solid(stage: &Stage, geom: usize) -> RaySolid {
     let center = stage.data.geom_xpos()[geom];
     let rotation = stage.data.geom_xmat()[geom];
     let axes = [0, 1, 2].map(|column| [rotation[column], rotation[3 + column], rotation[6 + column]]);
-    let size = stage.model().geom_size()[geom];
-    match stage.model().geom_type()[geom] {
+    let size = stage.model.geom_size()[geom];
+    match stage.model.geom_type()[geom] {
         Kind::mjGEOM_SPHERE => RaySolid::Capsule { center, axis: axes[2], half: 0.0, radius: size[0] },
         Kind::mjGEOM_CAPSULE => RaySolid::Capsule { center, axis: axes[2], half: size[1], radius: size[0] },
         _ => RaySolid::Box { center, axes, halves: size },

@@ -4,7 +4,7 @@ use super::super::world::World;
 use super::Visibility;
 use mirrorstats_experiment::spec::{Answer, Fact, UNKNOWN};
 use mirrorstats_trace::episodes::answers::Answered;
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 impl World {
     /// The true answers by key, without those undefined in this condition.
@@ -39,13 +39,10 @@ impl World {
 
     /// The number of bodies left of the own one in the first mirror; `None` if it does not show the own one to the eye.
     fn mirror_place(&self) -> Option<usize> {
-        let pane = self.scene().panes.first().filter(|pane| pane.double.is_none())?;
+        let pane = self.scene().panes.first().filter(|pane| pane.double.is_none() && pane.is_shown_at(self.t()))?;
         let eye = self.pose().ahead(self.config().eye.forward).spot();
-        let [away, aside] = [pane.place.distance(eye, self.config()), pane.place.aside(eye)];
-        // A body's image is as far behind the mirror as the body is before it.
-        let to_the_left =
-            |spot: [f64; 2]| (pane.place.aside(spot) - aside) / (pane.place.distance(spot, self.config()) + away);
-        let all: Vec<f64> = self.figures_in(0).iter().map(|figure| to_the_left(figure.pose.spot())).collect();
+        let across = |spot: [f64; 2]| pane.place.across(spot, eye, self.config());
+        let all: Vec<f64> = self.figures_in(0).iter().map(|figure| across(figure.pose.spot())).collect();
         let own = *all.first()?;
         Some(all.iter().filter(|other| **other > own).count())
     }

@@ -2,7 +2,7 @@
 
 use super::super::label_image::LabelImage;
 use super::super::mirror_eye;
-use super::super::model::{Item, Stage, group};
+use super::super::model::Item;
 use super::super::scene::HungPane;
 use super::super::world::World;
 use mirrorstats_experiment::angle::sine_cosine;
@@ -12,7 +12,6 @@ use mirrorstats_experiment::spec::PaneKind;
 pub enum Shown {
     /// A thing that the eye sees directly: the room, a body, a cube, a mark.
     Direct(Item),
-    /// The same through the pane of this number.
     Through(usize, Item),
 }
 
@@ -26,7 +25,6 @@ impl Shown {
         u8::try_from(code).expect("a world holds fewer than 256 things to be seen")
     }
 
-    /// The meaning of a byte of [`Shown::code`].
     pub fn of_code(code: u8) -> Self {
         let (look, at) = (usize::from(code) / Item::COUNT, usize::from(code) % Item::COUNT);
         look.checked_sub(1)
@@ -58,7 +56,7 @@ pub(super) fn plus(a: Vector, times: f64, b: Vector) -> Vector {
 
 /// A pinhole camera: the ray of a pixel is `forward + u right + v up`, with u and v from -1 to 1.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct RayView {
+pub struct RayView {
     pub origin: Vector,
     pub forward: Vector,
     /// Half of the view's width at one metre.
@@ -77,14 +75,12 @@ pub(super) fn middle(at: usize, count: usize) -> f64 {
 }
 
 impl RayView {
-    pub(crate) fn of_eye(world: &World, width: usize, height: usize) -> Self {
+    pub fn of_eye(world: &World, width: usize, height: usize) -> Self {
         let eye = &world.config().eye;
         let pose = world.pose();
         let [x, y] = pose.heading.direction();
         let ahead = pose.ahead(eye.forward);
-        let (sine, cosine) = sine_cosine(eye.fovy / 2.0);
-        let tangent = sine / cosine;
-        let wide = tangent * f64::from(eye.width) / f64::from(eye.height_px);
+        let [wide, tangent] = eye.half_extent();
         let (down, level) = if eye.pitch > 0.0 { sine_cosine(eye.pitch) } else { (0.0, 1.0) };
         Self {
             origin: [ahead.x, ahead.y, eye.height],
@@ -98,7 +94,7 @@ impl RayView {
 
     /// The view through a pane: for a mirror from the eye's mirror image, for a window from an eye moved back by the
     /// distance of the second room.
-    pub fn through(&self, world: &World, pane: &HungPane) -> Self {
+    pub(crate) fn through(&self, world: &World, pane: &HungPane) -> Self {
         let [out_x, out_y] = pane.place.heading().direction();
         let [x, y] = pane.place.center(world.config());
         if pane.kind == PaneKind::Window {
@@ -124,50 +120,6 @@ impl RayView {
         let [u, v] = [middle(x, self.width), -middle(y, self.height)];
         plus(plus(self.forward, u, self.right), v, self.up)
     }
-}
-
-/// The groups of geoms that rays meet.
-fn shown_groups() -> [u8; 6] {
-    let mut groups = [0; 6];
-    for group in [group::ROOM, group::CEILING, group::THINGS, group::EGO] {
-        groups[usize::try_from(group).expect("groups are 0 to 5")] = 1;
-    }
-    groups
-}
-
-pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: usize, height: usize) -> LabelImage {
-    let view = RayView::of_eye(world, width, height);
-    let (stage, beyond) = stages;
-    let mut codes = Vec::with_capacity(width * height);
-    let groups = shown_groups();
-    for y in 0..height {
-        for x in 0..width {
-            let ray = view.ray(x, y);
-            let (geom, distance) = stage.data.ray(&view.origin, &ray, Some(&groups), true, None, None);
-            let shown = match geom.map_or(Item::Room, |geom| stage.items()[geom]) {
-                Item::Pane(pane) => {
-                    let met = plus(view.origin, distance, ray);
-                    Shown::Through(pane, onwards(world, &mut beyond[pane], pane, met, ray))
-                }
-                item => Shown::Direct(item),
-            };
-            codes.push(shown.code());
-        }
-    }
-    LabelImage { width, height, codes }
-}
-
-fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vector) -> Item {
-    let hung = &world.scene().panes[pane];
-    let [out_x, out_y] = hung.place.heading().direction();
-    let out = [out_x, out_y, 0.0];
-    let (from, ray) = match hung.kind {
-        PaneKind::Window => (plus(met, -mirror_eye::shift(world.config()), out), ray),
-        _ => (met, plus(ray, -2.0 * dot(ray, out), out)),
-    };
-    let from = plus(from, 1e-9, ray);
-    let (geom, _) = stage.data.ray(&from, &ray, Some(&shown_groups()), true, None, None);
-    geom.map_or(Item::Room, |geom| stage.items()[geom])
 }
 
 impl LabelImage {

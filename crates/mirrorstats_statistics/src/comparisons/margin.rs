@@ -4,15 +4,14 @@
 //! variance under the null hypothesis is never too small. Up to `MOST_ENUMERATED` outcomes the p value is exact: the
 //! maximum over the rate that the null hypothesis leaves open (Chan 1998). Beyond, it is the normal approximation.
 
+use crate::intervals::clustered::fewest_clusters;
 use crate::intervals::interval::Interval;
 use crate::intervals::quantile::{normal, normal_below};
 use crate::power::POWER;
 
-/// The most outcomes that are enumerated.
 const MOST_ENUMERATED: usize = 6000;
 /// The number of values tried for the rate that the null hypothesis leaves open.
 const NUISANCE: u32 = 100;
-/// The tolerance for equal statistics.
 const TIE: f64 = 1e-9;
 
 /// The units of two sides: shared units with the means of both, and units of one side alone.
@@ -110,7 +109,6 @@ pub struct Spread {
     pub gain: f64,
     /// The variance that one unit contributes.
     pub variance: f64,
-    /// The units on the smaller side.
     pub units: u64,
 }
 
@@ -123,7 +121,8 @@ impl Spread {
 
     /// The number of units per side that makes one verdict likely, if the difference stays unchanged. `level` is
     /// two-sided for a difference and one-sided for the margin; the power is 0.8. `None` if more units bring no verdict
-    /// closer.
+    /// closer. At least as many as any exact test needs. If so many gave no verdict yet, the approximation is too
+    /// optimistic here, and the answer is twice as many.
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a positive number, bounded above")]
     pub fn settling(self, margin: f64, level: f64) -> Option<u64> {
         let needed = |distance: f64, tail: f64| {
@@ -132,7 +131,9 @@ impl Spread {
         let told_apart = needed(self.gain, level / 2.0);
         let within = if self.gain > -margin { needed(self.gain + margin, level) } else { f64::INFINITY };
         let least = told_apart.min(within).ceil();
-        (least.is_finite() && least < 1e9).then(|| (least as u64).max(self.units + 1))
+        let fewest = fewest_clusters(level) as u64;
+        let settling = || (least as u64).max(fewest);
+        (least.is_finite() && least < 1e9).then(|| if settling() > self.units { settling() } else { 2 * self.units })
     }
 }
 

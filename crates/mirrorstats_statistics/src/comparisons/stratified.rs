@@ -3,9 +3,6 @@
 //! Rule: sides are compared only within a stratum, so unequal difficulty and size of strata do not confound them. A
 //! stratum without episodes of one side is left out. Paired episodes belong to [`pooled`].
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 use crate::comparisons::paired::Pairs;
 use crate::comparisons::unpaired::tables;
 use crate::intervals::interval::Interval;
@@ -16,7 +13,7 @@ use crate::outcomes::{ExactTest, Outcomes};
 const MOST_PRODUCTS: usize = 1 << 24;
 
 /// One stratum: the successes and the episodes of each side.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stratum {
     /// The successes and the episodes of the first.
     pub first: (u64, u64),
@@ -24,8 +21,7 @@ pub struct Stratum {
     pub second: (u64, u64),
 }
 
-/// The Mantel-Haenszel risk difference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommonDifference {
     /// The first rate minus the second, averaged over the strata with the weights m n / (m + n).
     pub difference: f64,

@@ -19,9 +19,10 @@ pub struct Trend {
     pub strata: u64,
 }
 
-/// The test over strata of (dose, success), with the variance of permutations within each stratum (Mantel 1963). `None`
-/// if no stratum has two doses and both outcomes, and for a dose that is not finite.
-pub fn cochran_armitage<S: AsRef<[(f64, bool)]>>(strata: &[S]) -> Option<Trend> {
+/// The test over strata of (dose, value), with the variance of permutations within each stratum (Mantel 1963). A value is
+/// 0 or 1, or the mean of a stratum's repeats at a dose. `None` if no stratum has two doses and two values, and for a
+/// dose that is not finite.
+pub fn cochran_armitage<S: AsRef<[(f64, f64)]>>(strata: &[S]) -> Option<Trend> {
     let (mut excess, mut variance, mut informative) = (0.0, 0.0, 0);
     for stratum in strata.iter().map(AsRef::as_ref) {
         if stratum.iter().any(|(dose, _)| !dose.is_finite()) {
@@ -38,17 +39,19 @@ pub fn cochran_armitage<S: AsRef<[(f64, bool)]>>(strata: &[S]) -> Option<Trend> 
     (variance > 0.0).then(|| Trend { z, p: quantile::chi_squared_above(z * z), strata: informative })
 }
 
-/// The sum of the successes' doses minus its mean over all permutations, and its variance.
-fn term(stratum: &[(f64, bool)]) -> (f64, f64) {
+/// The sum of the values times their doses minus its mean over all permutations, and its variance.
+fn term(stratum: &[(f64, f64)]) -> (f64, f64) {
     let n = stratum.len() as f64;
-    if stratum.len() < 2 {
+    // Means of repeats may differ by rounding from their own mean.
+    if stratum.len() < 2 || stratum.iter().all(|(_, value)| value.total_cmp(&stratum[0].1).is_eq()) {
         return (0.0, 0.0);
     }
     let mean = stratum.iter().map(|(dose, _)| dose).sum::<f64>() / n;
-    let rate = stratum.iter().filter(|(_, success)| *success).count() as f64 / n;
+    let rate = stratum.iter().map(|(_, value)| value).sum::<f64>() / n;
     let spread: f64 = stratum.iter().map(|(dose, _)| (dose - mean).powi(2)).sum();
-    let excess = stratum.iter().filter(|(_, success)| *success).map(|(dose, _)| dose - mean).sum();
-    (excess, n / (n - 1.0) * rate * (1.0 - rate) * spread)
+    let varied: f64 = stratum.iter().map(|(_, value)| (value - rate).powi(2)).sum();
+    let excess = stratum.iter().map(|(dose, value)| (dose - mean) * value).sum();
+    (excess, varied / (n - 1.0) * spread)
 }
 
 #[cfg(test)]
@@ -57,8 +60,10 @@ mod tests {
     use super::cochran_armitage;
 
     /// Successes and episodes by dose, as one stratum.
-    fn stratum(counts: &[(f64, usize, usize)]) -> Vec<(f64, bool)> {
-        let each = |&(dose, successes, n): &(f64, usize, usize)| (0..n).map(move |at| (dose, at < successes));
+    fn stratum(counts: &[(f64, usize, usize)]) -> Vec<(f64, f64)> {
+        let each = |&(dose, successes, n): &(f64, usize, usize)| {
+            (0..n).map(move |at| (dose, f64::from(u8::from(at < successes))))
+        };
         counts.iter().flat_map(each).collect()
     }
 
@@ -95,12 +100,12 @@ mod tests {
     // Python: itertools 3.11, mean and variance over every permutation within each stratum; scipy 1.17.1 norm.sf.
     #[test]
     fn several_strata_are_permuted_each_by_itself() {
-        let strata: [&[(f64, bool)]; 5] = [
-            &[(0.0, true), (2.0, true), (8.0, false)],
-            &[(0.0, true), (2.0, false), (8.0, false)],
-            &[(0.0, false), (2.0, true), (8.0, false)],
-            &[(0.0, true), (2.0, true), (8.0, true)],
-            &[(0.0, false), (2.0, false), (8.0, true), (8.0, false)],
+        let strata: [&[(f64, f64)]; 5] = [
+            &[(0.0, 1.0), (2.0, 1.0), (8.0, 0.0)],
+            &[(0.0, 1.0), (2.0, 0.0), (8.0, 0.0)],
+            &[(0.0, 0.0), (2.0, 1.0), (8.0, 0.0)],
+            &[(0.0, 1.0), (2.0, 1.0), (8.0, 1.0)],
+            &[(0.0, 0.0), (2.0, 0.0), (8.0, 1.0), (8.0, 0.0)],
         ];
         let found = cochran_armitage(&strata).unwrap();
         close(found.z, -0.8471323832501184);
@@ -110,7 +115,7 @@ mod tests {
 
     #[test]
     fn without_a_comparison_there_is_no_trend() {
-        assert_eq!(cochran_armitage::<Vec<(f64, bool)>>(&[]), None);
+        assert_eq!(cochran_armitage::<Vec<(f64, f64)>>(&[]), None);
         assert_eq!(cochran_armitage(&[stratum(&[(0.0, 3, 3), (1.0, 4, 4)])]), None, "all succeed");
         assert_eq!(cochran_armitage(&[stratum(&[(2.0, 1, 4)])]), None, "one dose");
         assert_eq!(cochran_armitage(&[stratum(&[(0.0, 1, 2), (f64::NAN, 1, 2)])]), None);

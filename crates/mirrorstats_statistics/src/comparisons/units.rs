@@ -10,14 +10,15 @@ use crate::outcomes::ExactTest;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::ratio::Ratio;
 
-/// The most outcomes that are enumerated.
 const MOST_OUTCOMES: usize = 1 << 21;
-/// The largest common denominator.
 const MOST_DENOMINATOR: i128 = 1 << 40;
 
-/// A test over units: its p value, and the least p value of any outcome.
+/// A test over units: its estimate, its p value, and the least p value of any outcome.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitTest {
+    /// The score divided by its weight: the mean difference of shared units, and the difference of the means of the other
+    /// units, weighted by their number of pairs and the harmonic mean of their sizes (Mantel and Haenszel 1959).
+    pub difference: f64,
     pub p: f64,
     /// The least p value for the same number of units.
     pub least: f64,
@@ -58,7 +59,7 @@ pub(crate) fn rate_test_of_sum(sum: i128, denominator: i128, n: u64, level: Rati
 pub fn difference_test(Sides { shared, first, second }: &Sides) -> Option<UnitTest> {
     let all: Vec<Moments> =
         shared.iter().flat_map(|&(a, b)| [a, b]).chain(first.iter().chain(second).copied()).collect();
-    let (values, _) = means(&all)?;
+    let (values, denominator) = means(&all)?;
     let (pairs, pool) = values.split_at(2 * shared.len());
     let differences: Vec<i128> = pairs.chunks(2).map(|pair| pair[0] - pair[1]).collect();
     let is_pooled = !first.is_empty() && !second.is_empty();
@@ -71,7 +72,9 @@ pub fn difference_test(Sides { shared, first, second }: &Sides) -> Option<UnitTe
     let scale = pool.len().max(1) as i128;
     let expected = 2 * drawn as i128 * pool.iter().sum::<i128>();
     let score = |difference: i128, sum: i128| scale * difference + 2 * scale * sum - expected;
-    let seen = score(differences.iter().sum(), pool[..drawn].iter().sum()).abs();
+    let of_seen = score(differences.iter().sum(), pool[..drawn].iter().sum());
+    let seen = of_seen.abs();
+    let weight = scale * differences.len() as i128 + 2 * (drawn * (pool.len() - drawn)) as i128;
     let (signed, chosen) = (flips(&differences)?, draws(pool, drawn)?);
     if signed.len().checked_mul(chosen.len())? > MOST_OUTCOMES {
         return None;
@@ -80,7 +83,17 @@ pub fn difference_test(Sides { shared, first, second }: &Sides) -> Option<UnitTe
     let most = outcomes().map(|(score, _)| score).max()?;
     let beyond = |limit: i128| outcomes().filter(|(score, _)| *score >= limit).map(|(_, weight)| weight).sum::<f64>();
     let all = beyond(0);
-    Some(UnitTest { p: beyond(seen) / all, least: beyond(most) / all })
+    let difference = of_seen as f64 / (denominator * weight) as f64;
+    Some(UnitTest { difference, p: beyond(seen) / all, least: beyond(most) / all })
+}
+
+/// The mean of the units' means; `None` without units.
+pub fn mean(units: &[Moments]) -> Option<f64> {
+    if let Some((values, denominator)) = means(units).filter(|(values, _)| !values.is_empty()) {
+        return Some(values.iter().sum::<i128>() as f64 / (denominator * values.len() as i128) as f64);
+    }
+    let sum: f64 = units.iter().map(|unit| unit.mean()).sum::<Option<f64>>()?;
+    (!units.is_empty()).then(|| sum / units.len() as f64)
 }
 
 fn means(units: &[Moments]) -> Option<(Vec<i128>, i128)> {

@@ -112,7 +112,6 @@ impl Incidence {
 }
 
 impl Point {
-    /// The episodes that ended in this step, by [`Outcome`].
     fn counts(&self) -> [f64; 3] {
         self.ended.map(|count| count as f64)
     }

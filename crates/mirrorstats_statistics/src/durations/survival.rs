@@ -39,9 +39,7 @@ pub struct Point {
     pub decided: u64,
     /// The episodes that ended in this step, by [`Outcome`].
     pub(crate) ended: [u64; 3],
-    /// The share undecided before this step.
     pub(crate) before: f64,
-    /// The share undecided after this step.
     pub undecided: f64,
 }
 

@@ -42,6 +42,8 @@ pub enum Withheld {
     Dependent,
     /// The two sides were recorded differently.
     Incomparable,
+    /// A conditional metric is defined in a part of the episodes, which the outcome selects.
+    Selected,
 }
 
 /// The interval of `n` values if it may be shown, otherwise the reason why not.

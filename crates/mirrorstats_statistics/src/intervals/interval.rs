@@ -33,7 +33,6 @@ impl Interval {
         Self { low: -self.high, high: -self.low }
     }
 
-    /// Returns true if `value` is between the bounds, inclusive.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
@@ -44,12 +43,22 @@ impl Interval {
 /// without failures exactly 1. `None` for n = 0, for more successes than n, and for a confidence outside (0, 1).
 pub fn wilson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     let failures = counted(successes, n)?;
+    score(successes as f64, failures as f64, n as f64, confidence)
+}
+
+/// The same over `n` units of several episodes each. A unit counts once, as the mean of its episodes; that varies at most
+/// as much as one verdict per unit, so the interval is never too narrow for its mean.
+pub fn wilson_of_units(mean: f64, n: usize, confidence: f64) -> Option<Interval> {
+    let n = n as f64;
+    if n > 0.0 { score(mean * n, (1.0 - mean) * n, n, confidence) } else { None }
+}
+
+fn score(k: f64, rest: f64, n: f64, confidence: f64) -> Option<Interval> {
     let z = quantile::normal(quantile::tail(confidence)?);
-    let (k, rest, n) = (successes as f64, failures as f64, n as f64);
     let spread = z * (z * z + 4.0 * k * rest / n).sqrt();
     let width = 2.0 * (n + z * z);
-    let low = if successes == 0 { 0.0 } else { ((2.0 * k + z * z - spread) / width).max(0.0) };
-    let high = if failures == 0 { 1.0 } else { ((2.0 * k + z * z + spread) / width).min(1.0) };
+    let low = if k == 0.0 { 0.0 } else { ((2.0 * k + z * z - spread) / width).max(0.0) };
+    let high = if rest == 0.0 { 1.0 } else { ((2.0 * k + z * z + spread) / width).min(1.0) };
     Some(Interval { low, high })
 }
 

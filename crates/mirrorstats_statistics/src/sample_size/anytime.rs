@@ -36,7 +36,6 @@ impl Anytime {
         Self { level, every, shares, hypothesis, within, running, stopped }
     }
 
-    /// The e-value to reach.
     pub fn boundary(&self) -> f64 {
         self.level.recip()
     }
@@ -51,7 +50,6 @@ impl Anytime {
         sum + (1.0 - stopped) * n as f64
     }
 
-    /// Continues to `n` episodes.
     fn run(&mut self, n: u64) {
         while (self.stopped.len() as u64 + 1) * self.every <= n {
             (0..self.every).for_each(|_| self.step());

@@ -29,12 +29,9 @@ pub trait Power {
     }
 }
 
-/// Two rates.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
-    /// The lower one.
     pub lower: f64,
-    /// The higher one.
     pub higher: f64,
 }
 
@@ -86,7 +83,6 @@ impl Clusters {
         if self.are_units() { self.seeds } else { self.seeds * runs }
     }
 
-    /// The power of a test with `runs` runs per seed.
     pub fn power(self, test: &mut dyn Power, runs: u64) -> f64 {
         test.power(if self.are_units() { runs } else { self.seeds * runs })
     }

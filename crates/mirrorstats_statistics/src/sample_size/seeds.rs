@@ -16,9 +16,14 @@ pub const SEED: u64 = 20_260_203;
 #[derive(Clone, Copy, Debug)]
 pub enum BySeed {
     /// The difference of two models that share their seeds, and the share of discordant pairs.
-    Pairs { difference: f64, discordance: f64 },
-    /// One rate against a level of chance.
-    Rate { chance: Ratio, rate: f64 },
+    Pairs {
+        difference: f64,
+        discordance: f64,
+    },
+    Rate {
+        chance: Ratio,
+        rate: f64,
+    },
 }
 
 /// A test over seeds with equal numbers of runs. An episode takes its seed's outcome with probability sqrt(intraclass
@@ -32,7 +37,6 @@ pub struct Seeds {
 }
 
 impl Power for Seeds {
-    /// The power with `n` runs per seed.
     fn power(&mut self, n: u64) -> f64 {
         match self.test {
             BySeed::Pairs { difference, discordance } if n == 1 => {

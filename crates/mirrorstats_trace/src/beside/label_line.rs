@@ -1,12 +1,9 @@
-//! One line of a list of labels, and the errors of such lists.
-
-use std::io;
-use std::path::PathBuf;
+//! One line of a list of labels.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use mirrorstats_exact::budget::{Exceeded, Limit};
+use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 
 /// A note takes at most six bytes per character in JSON, and names are short.
@@ -81,16 +78,4 @@ impl InvalidLabel {
     fn new(expected: &'static str, found: impl Into<String>) -> Self {
         Self { expected, found: found.into() }
     }
-}
-
-#[derive(Debug, thiserror::Error)]
-pub enum LabelsError {
-    #[error("cannot read {}: {source}", .path.display())]
-    Read { path: PathBuf, source: io::Error },
-    #[error("cannot write {}: {source}\n  help: is the folder writable, and the disk not full?", .path.display())]
-    Write { path: PathBuf, source: io::Error },
-    #[error("{}, line {line}: {problem}\n  help: correct or remove the line; docs/how-to/view.md has examples", .path.display())]
-    Line { path: PathBuf, line: usize, problem: String },
-    #[error("{}: {source}", .path.display())]
-    Budget { path: PathBuf, source: Exceeded },
 }

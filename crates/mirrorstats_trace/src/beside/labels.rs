@@ -12,11 +12,10 @@ use indexmap::IndexSet;
 
 use mirrorstats_exact::budget::{Budget, Limit};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_exact::input;
 use mirrorstats_exact::replace::NewFile;
 
-use super::label_line::{LONGEST_LINE, LabelLine, LabelsError};
-use super::numbered_lines;
+use super::label_line::{LONGEST_LINE, LabelLine};
+use super::{ListError, lines, numbered_lines};
 use crate::inputs::Input;
 
 /// The prefix of column names: the label `confabulates` is the column `label_confabulates`.
@@ -37,8 +36,8 @@ pub fn list_beside(trace: &Path) -> PathBuf {
     recording.unwrap_or(folder).join("labels.jsonl")
 }
 
-pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
-    let failed = |source| LabelsError::Write { path: list.to_owned(), source };
+pub fn append(list: &Path, line: &LabelLine) -> Result<(), ListError> {
+    let failed = |source| ListError::Write { path: list.to_owned(), source };
     let mut file = OpenOptions::new().create(true).append(true).read(true).open(list).map_err(failed)?;
     let mut text = serde_json::to_string(line).map_err(io::Error::from).map_err(failed)?;
     text.push('\n');
@@ -55,18 +54,16 @@ pub fn append(list: &Path, line: &LabelLine) -> Result<(), LabelsError> {
 }
 
 /// Removes all lines about some episodes and returns their number. No program may add lines meanwhile.
-pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, LabelsError> {
-    let reading = |source| LabelsError::Read { path: list.to_owned(), source };
-    let writing = |source| LabelsError::Write { path: list.to_owned(), source };
-    let lines = match input::lines(list, LONGEST_LINE) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
-        lines => lines.map_err(reading)?,
-    };
+pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, ListError> {
+    let writing = |source| ListError::Write { path: list.to_owned(), source };
+    if !list.exists() {
+        return Ok(0);
+    }
     let mut file = NewFile::create(list).map_err(writing)?;
     let mut kept = BufWriter::new(file.as_file_mut());
     let mut removed = 0;
-    for line in lines {
-        let line = line.map_err(reading)?;
+    for line in lines(list, LONGEST_LINE)? {
+        let line = line?;
         // Invalid labels of these episodes go too.
         let label: serde_json::Value = serde_json::from_slice(&line).unwrap_or_default();
         if label["episode_id"].as_str().is_some_and(|id| episodes.contains(id)) {
@@ -83,7 +80,6 @@ pub fn remove(list: &Path, episodes: &BTreeSet<String>) -> Result<usize, LabelsE
     Ok(removed)
 }
 
-/// A coder's mark on an episode or a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark<'l> {
     pub coder: &'l str,
@@ -123,8 +119,7 @@ fn position(set: &mut IndexSet<String>, name: String) -> u32 {
 }
 
 impl Labels {
-    /// The labels in the lists beside some traces; empty without lists.
-    pub fn beside(traces: &[Input]) -> Result<Self, LabelsError> {
+    pub fn beside(traces: &[Input]) -> Result<Self, ListError> {
         let mut labels = Self::default();
         let lists: BTreeSet<PathBuf> = traces.iter().map(|input| list_beside(&input.path)).collect();
         let mut marks = BTreeSet::new();
@@ -135,14 +130,14 @@ impl Labels {
         Ok(labels)
     }
 
-    fn read(&mut self, list: &Path, marks: &mut BTreeSet<Key>) -> Result<(), LabelsError> {
-        let failed = |source| LabelsError::Read { path: list.to_owned(), source };
-        let exceeded = |source| LabelsError::Budget { path: list.to_owned(), source };
+    fn read(&mut self, list: &Path, marks: &mut BTreeSet<Key>) -> Result<(), ListError> {
+        let exceeded = |source| ListError::Budget { path: list.to_owned(), source };
         let notes = Budget::new(MOST_NOTES);
-        for line in numbered_lines(list, LONGEST_LINE).map_err(failed)? {
-            let (number, line) = line.map_err(failed)?;
+        for line in numbered_lines(list, LONGEST_LINE)? {
+            let (number, line) = line?;
             MOST_LINES.check(number as u64).map_err(exceeded)?;
-            let wrong = |problem| LabelsError::Line { path: list.to_owned(), line: number, problem };
+            let help = "correct or remove the line; docs/how-to/view.md has examples";
+            let wrong = |problem| ListError::Line { path: list.to_owned(), line: number, problem, help };
             let line: LabelLine = serde_json::from_slice(&line).map_err(|error| {
                 let found = error.to_string();
                 let found = found.split(" at line ").next().unwrap_or_default();
@@ -180,7 +175,6 @@ impl Labels {
         self.marks.is_empty()
     }
 
-    /// The labels in use, in alphabetical order.
     pub fn words(&self) -> BTreeSet<&str> {
         self.marks.iter().filter_map(|key| self.words.get_index(key.word as usize)).map(String::as_str).collect()
     }
@@ -197,7 +191,6 @@ impl Labels {
             .map(|number| &*self.episodes[number as usize])
     }
 
-    /// The marks of an episode: its own, then those of its steps.
     pub fn of_episode(&self, id: &str) -> impl Iterator<Item = Mark<'_>> {
         let known = self.episodes.get_index_of(id).and_then(|at| u32::try_from(at).ok());
         let marks = known.map(|episode| {

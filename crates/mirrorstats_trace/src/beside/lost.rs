@@ -1,13 +1,12 @@
 //! `lost.jsonl` beside the traces: the episodes that failures prevented, one JSON object per line.
 
 use std::collections::BTreeSet;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::numbered_lines;
+use super::{ListError, numbered_lines};
 use crate::inputs::Input;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
@@ -39,39 +38,27 @@ pub struct LostEpisode {
     pub reason: String,
 }
 
-#[derive(Debug, thiserror::Error)]
-pub enum LostListError {
-    #[error("cannot read {}: {source}", .path.display())]
-    Io { path: PathBuf, source: io::Error },
-    #[error(
-        "{}, line {line}: expected a lost episode as `mirrorstats record` lists it, found {found}\n  \
-         help: `mirrorstats record` writes the list anew; remove the line, or the file if no episode is missing",
-        .path.display()
-    )]
-    Line { path: PathBuf, line: usize, found: String },
-}
-
 pub fn list_of(folder: &Path) -> PathBuf {
     folder.join("lost.jsonl")
 }
 
 /// The contents of a list; empty if the file does not exist.
-pub fn read(path: &Path) -> Result<Vec<LostEpisode>, LostListError> {
-    let failed = |source| LostListError::Io { path: path.to_owned(), source };
+pub fn read(path: &Path) -> Result<Vec<LostEpisode>, ListError> {
     let mut found = Vec::new();
-    for line in numbered_lines(path, LONGEST_LINE).map_err(failed)? {
-        let (line, text) = line.map_err(failed)?;
-        let wrong = |error: serde_json::Error| {
+    for line in numbered_lines(path, LONGEST_LINE)? {
+        let (line, text) = line?;
+        found.push(serde_json::from_slice(&text).map_err(|error| {
             let found = visible(&error.to_string());
-            LostListError::Line { path: path.to_owned(), line, found }
-        };
-        found.push(serde_json::from_slice(&text).map_err(wrong)?);
+            let problem = format!("expected a lost episode as `mirrorstats record` lists it, found {found}");
+            let help =
+                "`mirrorstats record` writes the list anew; remove the line, or the file if no episode is missing";
+            ListError::Line { path: path.to_owned(), line, problem, help }
+        })?);
     }
     Ok(found)
 }
 
-/// The lost episodes of some traces: those in the lists of their folders, each once.
-pub fn beside(traces: &[Input]) -> Result<Vec<LostEpisode>, LostListError> {
+pub fn beside(traces: &[Input]) -> Result<Vec<LostEpisode>, ListError> {
     let folders: BTreeSet<&Path> = traces.iter().filter_map(|input| input.path.parent()).collect();
     let mut all = BTreeSet::new();
     for folder in folders {

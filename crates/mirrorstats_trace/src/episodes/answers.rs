@@ -9,7 +9,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 
-use crate::schema::{Column, DeclaredColumn, Kind, Stored, Value};
+use crate::schema::{Column, DeclaredColumn, Kind, Scope, Stored, Value};
 
 /// The prefixes of the column names: of the answer, and of its truth.
 pub const PREFIXES: [&str; 2] = ["answer_", "truth_"];
@@ -41,7 +41,6 @@ impl Answered {
         }
     }
 
-    /// The value of a cell; `None` if answers cannot have its type.
     pub(crate) fn from_value(value: Value<'_>) -> Option<Self> {
         match value {
             Value::Text(text) => Some(Self::Text(text.to_owned())),
@@ -50,7 +49,6 @@ impl Answered {
         }
     }
 
-    /// The text for the columns `answer` and `answer_truth`.
     pub fn text(&self) -> String {
         match self {
             Self::Number(number) => number.to_string(),
@@ -63,7 +61,6 @@ pub fn columns_of(key: &str) -> [String; 2] {
     PREFIXES.map(|prefix| format!("{prefix}{key}"))
 }
 
-/// Returns true if a column of this name may belong to an answer.
 pub fn is_answer(name: &str) -> bool {
     // `answer_truth` belongs to the schema.
     PREFIXES.iter().any(|prefix| name.starts_with(prefix)) && crate::schema::column(name).is_none()
@@ -117,7 +114,10 @@ pub(crate) fn known(name: &str, kind: Kind) -> Option<&'static Column> {
         return None;
     }
     let stored = if kind == Kind::Float { Stored::Float64 } else { Stored::String };
-    let column: &'static Column = Box::leak(Box::new(Column::of_answer(name.to_owned().leak(), stored)));
+    let doc = "An answer that the experiment declares, or what it should be.";
+    let name: &'static str = name.to_owned().leak();
+    let column = Column { name, stored, nullable: true, doc, scope: Scope::Any, ..Column::default() };
+    let column: &'static Column = Box::leak(Box::new(column));
     all.insert(key, column);
     Some(column)
 }

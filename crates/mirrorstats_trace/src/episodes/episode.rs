@@ -44,13 +44,9 @@ pub struct Episode {
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
-    /// The action; `None` if the reply gave none.
     pub action: Option<Action>,
-    /// The self-attribution: a colour or `unknown`; `None` if the reply gave none.
     pub self_color: Option<String>,
-    /// A colour or `none`; `None` if the reply gave none.
     pub selected_cube: Option<String>,
-    /// Ground truth: mirror evidence is in view.
     pub mirror_visible: bool,
     pub extra: Extra,
 }

@@ -1,7 +1,6 @@
 pub mod answers;
 pub mod episode;
 pub mod episode_hash;
-pub mod frame;
+mod fields;
 pub mod identification;
 pub mod moments;
-pub mod palette;

@@ -2,9 +2,7 @@ use crate::episodes::episode::{Action, Episode};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Moment {
-    /// Mirror evidence is in view for the first time.
     FirstSight,
-    /// A colour is claimed for the first time.
     FirstClaim,
     Decision,
 }

@@ -6,7 +6,6 @@ use crate::footers::model_id::{OWN_SERVER, answers_for};
 use crate::read::open::TraceFile;
 use mirrorstats_exact::escape::visible;
 
-/// A sentence for each file with answers by a model that was not requested.
 pub fn by_others(files: &[TraceFile]) -> Vec<String> {
     let note = |file: &TraceFile| {
         let recording = file.recording();

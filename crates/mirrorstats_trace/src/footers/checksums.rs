@@ -4,7 +4,6 @@ pub use mirrorstats_parquet_pages::checksums::Checksums;
 
 use crate::read::open::TraceFile;
 
-/// A sentence about files with another file's checksums; `None` if there are none.
 pub fn stale_note(files: &[TraceFile]) -> Option<String> {
     let stale = named(files, Checksums::Stale)?;
     Some(format!(
@@ -13,7 +12,6 @@ pub fn stale_note(files: &[TraceFile]) -> Option<String> {
     ))
 }
 
-/// A sentence about the files without checksums; `None` if there are none.
 pub fn missing_note(files: &[TraceFile]) -> Option<String> {
     let missing = named(files, Checksums::None)?;
     Some(format!("{missing}: no checksums; damage to the data may not be found"))

@@ -35,12 +35,9 @@ pub enum Cluster {
     Seed,
 }
 
-/// The registration of a plan before the recording.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Registration {
-    /// SHA-256 of the plan.
     pub sha256: String,
-    /// SHA-256 of the definitions that the plan names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub definitions: Option<String>,
 }

@@ -3,27 +3,28 @@
 //!
 //! Rule: keys that analysis does not need are ignored. An invalid value of a needed key is a fault of the file.
 
+use std::fmt::Display;
+
 use indexmap::IndexMap;
 use serde_json::Value;
 
 use crate::diagnostic::{Code, Finding};
 use crate::episodes::answers;
 use crate::schema::{DeclaredColumn, RECORDING_KEY, of_some_tasks};
+use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::ratio::Ratio;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeclaredExperiment {
     /// The value of the column `experiment` in its episodes; not empty.
     pub name: String,
-    /// The heading of its group in tables, without its name.
     pub title: Option<String>,
     pub order: Option<i64>,
     /// Chance levels by metric; `None` says that the metric has none in this experiment.
-    pub chance: IndexMap<String, Option<Ratio>>,
+    pub chance: IndexMap<String, Option<Chance>>,
     pub reference: IndexMap<String, Vec<Ratio>>,
     /// The definitions that score it, by name or by the path of the file; `None` if not declared.
     pub definitions: Option<String>,
-    /// SHA-256 of the definition file, if it is the user's own.
     pub definitions_hash: Option<String>,
     /// Columns of `of_some_tasks` without a meaning in its task, in this order.
     pub absent: Vec<&'static str>,
@@ -32,28 +33,16 @@ pub struct DeclaredExperiment {
 
 const HELP: &str = "write it as a definition file has it under `[experiment.NAME]`, or remove the key from the footer";
 
-/// An invalid declaration: its place in the recording, the expected value, and the value found.
-struct DeclarationFault {
-    key: String,
-    expected: &'static str,
-    found: String,
-}
-
 pub(crate) fn of_recording(file: &str, recording: &Value) -> Result<Vec<DeclaredExperiment>, Box<Finding>> {
-    read(recording).map_err(|DeclarationFault { key, expected, found }| {
-        let expected = format!("`{RECORDING_KEY}.{key}` to be {expected}");
-        Box::new(Finding::new(Code::InvalidMetadata, file, expected, found).with_help(HELP))
-    })
+    read(recording).map_err(|finding| Box::new(Finding { file: file.to_owned(), ..*finding }))
 }
 
-pub(crate) fn absent(file: &str, recording: &Value) -> Vec<&'static str> {
-    // An invalid recording is reported elsewhere.
-    let declared = of_recording(file, recording).unwrap_or_default();
+pub(crate) fn absent(declared: &[DeclaredExperiment]) -> Vec<&'static str> {
     let say_so = |name: &str| declared.iter().all(|experiment| experiment.absent.contains(&name));
     of_some_tasks().filter(|name| !declared.is_empty() && say_so(name)).collect()
 }
 
-fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, DeclarationFault> {
+fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Box<Finding>> {
     let several = match &recording["experiments"] {
         Value::Null => &[],
         Value::Array(several) => several.as_slice(),
@@ -74,7 +63,7 @@ fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, DeclarationFault> 
 }
 
 impl DeclaredExperiment {
-    fn read(key: &str, value: &Value) -> Result<Self, DeclarationFault> {
+    fn read(key: &str, value: &Value) -> Result<Self, Box<Finding>> {
         let members = value.as_object().ok_or_else(|| fault(key, "an object", value))?;
         let member = |name: &str| members.get(name).filter(|value| !value.is_null());
         let text = |name: &str, expected| match member(name) {
@@ -103,8 +92,8 @@ impl DeclaredExperiment {
 fn levels<T>(
     key: &str,
     value: Option<&Value>,
-    read: impl Fn(&str, &Value) -> Result<T, DeclarationFault>,
-) -> Result<IndexMap<String, T>, DeclarationFault> {
+    read: impl Fn(&str, &Value) -> Result<T, Box<Finding>>,
+) -> Result<IndexMap<String, T>, Box<Finding>> {
     let members = match value {
         None => return Ok(IndexMap::new()),
         Some(Value::Object(members)) => members,
@@ -114,7 +103,7 @@ fn levels<T>(
     members.iter().map(one).collect()
 }
 
-fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, DeclarationFault> {
+fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Box<Finding>> {
     let known = |name: &Value| of_some_tasks().find(|known| *name == **known);
     let Some(value) = value else { return Ok(Vec::new()) };
     let named: Option<Vec<_>> = value.as_array().and_then(|names| names.iter().map(known).collect());
@@ -122,14 +111,19 @@ fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Declar
     Ok(of_some_tasks().filter(|known| named.contains(known)).collect())
 }
 
-fn chance(key: &str, value: &Value) -> Result<Option<Ratio>, DeclarationFault> {
+fn chance(key: &str, value: &Value) -> Result<Option<Chance>, Box<Finding>> {
     if value == "none" {
         return Ok(None);
     }
-    ratio(value).map(Some).ok_or_else(|| fault(key, "a fraction such as `1/3`, or `none`", value))
+    let of_strategy = |(name, level): (&String, &Value)| Some((name.clone(), ratio(level)?));
+    let level = match value.as_object() {
+        Some(levels) => levels.iter().map(of_strategy).collect::<Option<_>>().map(Chance::ByStrategy),
+        None => ratio(value).map(Chance::Of),
+    };
+    level.map(Some).ok_or_else(|| fault(key, "a fraction such as `1/3`, or `none`", value))
 }
 
-fn reference(key: &str, value: &Value) -> Result<Vec<Ratio>, DeclarationFault> {
+fn reference(key: &str, value: &Value) -> Result<Vec<Ratio>, Box<Finding>> {
     let levels = value.as_array().map(|levels| levels.iter().map(ratio).collect::<Option<Vec<_>>>());
     levels.flatten().ok_or_else(|| fault(key, "a list of fractions such as `1/10`", value))
 }
@@ -142,13 +136,15 @@ fn ratio(value: &Value) -> Option<Ratio> {
     }
 }
 
-fn fault(key: impl Into<String>, expected: &'static str, found: &Value) -> DeclarationFault {
+/// The finding for an invalid declaration, without its file.
+fn fault(key: impl Display, expected: &str, found: &Value) -> Box<Finding> {
     const SHOWN: usize = 80;
     let text = found.to_string();
     let shown: String = text.chars().take(SHOWN).collect();
     let rest = if shown.len() < text.len() { ".." } else { "" };
     let found = if found.is_null() { "none".to_owned() } else { format!("`{shown}{rest}`") };
-    DeclarationFault { key: key.into(), expected, found }
+    let expected = format!("`{RECORDING_KEY}.{key}` to be {expected}");
+    Box::new(Finding::new(Code::InvalidMetadata, "", expected, found).with_help(HELP))
 }
 
 #[cfg(test)]
@@ -165,22 +161,23 @@ mod tests {
     #[test]
     fn one_or_several_are_read_and_other_keys_are_not() {
         let six = json!({ "name": "E6", "title": "Delayed", "order": 6, "actions": 7,
-                          "chance": { "TSA": "2/6", "X": "none", "Y": 0.25 }, "reference": { "TSA": ["1/10", 0] } });
+                          "chance": { "TSA": "2/6", "X": "none", "Y": 0.25, "Z": { "a": "1/3", "b": 0.5 } }, "reference": { "TSA": ["1/10", 0] } });
         let found = declared(&json!({ "experiment": six, "experiments": [six, { "name": "E7" }] })).unwrap();
         let names: Vec<&str> = found.iter().map(|found| found.name.as_str()).collect();
         assert_eq!(names, ["E6", "E7"]);
         let [six, seven] = &found[..] else { panic!("{found:?}") };
         assert_eq!((six.title.as_deref(), six.order), (Some("Delayed"), Some(6)));
         let chance: Vec<String> = six.chance.values().map(|level| format!("{level:?}")).collect();
-        assert_eq!((six.chance["TSA"].unwrap().to_string(), chance[1].as_str()), ("1/3".to_owned(), "None"));
-        assert_eq!(six.chance["Y"].unwrap().to_string(), "1/4");
+        assert_eq!((six.chance["TSA"].as_ref().unwrap().to_string(), chance[1].as_str()), ("1/3".to_owned(), "None"));
+        assert_eq!(six.chance["Z"].as_ref().unwrap().to_string(), "1/3 by a or 1/2 by b");
+        assert_eq!(six.chance["Y"].as_ref().unwrap().to_string(), "1/4");
         assert_eq!(six.reference["TSA"].iter().map(ToString::to_string).collect::<Vec<_>>(), ["1/10", "0"]);
         assert_eq!((&seven.title, seven.order, seven.chance.len()), (&None, None, 0));
     }
 
     #[test]
     fn a_column_is_absent_if_every_experiment_declares_it_absent() {
-        let of = |recording: Value| absent("a.parquet", &recording);
+        let of = |recording: Value| absent(&of_recording("a.parquet", &recording).unwrap());
         let both = json!({ "name": "A", "absent": ["selected_cube", "self_color"] });
         let one = json!({ "name": "B", "absent": ["self_color"] });
         assert_eq!(of(json!({ "experiment": both })), ["self_color", "selected_cube"]);
@@ -214,6 +211,10 @@ mod tests {
             (of("title", json!(7)), "experiment.title` to be a text\n  found `7`"),
             (of("order", json!(1.5)), "experiment.order` to be a whole number\n  found `1.5`"),
             (of("chance", json!({ "TSA": "abc" })), "experiment.chance.TSA` to be a fraction such as `1/3`, or `none`"),
+            (
+                of("chance", json!({ "TSA": { "a": 1, "b": "c" } })),
+                "experiment.chance.TSA` to be a fraction such as `1/3`, or",
+            ),
             (of("chance", json!([1])), "experiment.chance` to be an object"),
             (
                 of("absent", json!(["t"])),

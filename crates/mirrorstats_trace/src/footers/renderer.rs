@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -11,7 +12,7 @@ use crate::read::open::TraceFile;
 use mirrorstats_exact::escape::visible;
 
 /// A renderer, the part `renderer` of a fingerprint.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Renderer {
     /// What OpenGL calls it, `GL_RENDERER`; `unknown` where it says nothing.
     pub name: String,
@@ -53,11 +54,5 @@ pub fn note(renderers: &[Renderer]) -> Option<String> {
 }
 
 fn once(all: impl Iterator<Item = Renderer>) -> Vec<Renderer> {
-    let mut found = Vec::new();
-    for renderer in all {
-        if !found.contains(&renderer) {
-            found.push(renderer);
-        }
-    }
-    found
+    all.collect::<IndexSet<_>>().into_iter().collect()
 }

@@ -84,15 +84,16 @@ enum ColumnSource {
         root: usize,
         cursor: Box<Cursor>,
     },
-    Library(Box<Library>),
+    Library(Box<BufferedRows>),
 }
 
-struct Library {
+/// The rows of the library's reader, whose batches are cut elsewhere than episodes.
+struct BufferedRows {
     reader: CheckedRows,
     held: Vec<ArrayRef>,
 }
 
-impl Library {
+impl BufferedRows {
     fn rows(&self) -> usize {
         self.held.iter().map(Array::len).sum()
     }
@@ -122,19 +123,9 @@ impl<'a> RowGroup<'a> {
         let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
         let text = roots.filter_map(|root| text_bytes(&readable.footer, root, row_group)).max().unwrap_or(0);
         let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
-        let sources = Vec::new();
-        let mut rows = Self {
-            file,
-            layout,
-            readable,
-            index: row_group,
-            ids,
-            sources,
-            first: 0,
-            at_a_time,
-            over: false,
-            seen: Vec::new(),
-        };
+        let (sources, seen) = (Vec::new(), Vec::new());
+        let mut rows =
+            Self { file, layout, readable, index: row_group, ids, sources, first: 0, at_a_time, over: false, seen };
         rows.seen = (0..layout.columns.len()).map(|at| rows.described(at).map(|_| Seen::default())).collect();
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
@@ -152,7 +143,7 @@ impl<'a> RowGroup<'a> {
 
     fn library(&self, at: usize, root: usize) -> Result<ColumnSource, Box<Finding>> {
         let reader = self.reader(root, self.first).map_err(|finding| self.placed(at, *finding))?;
-        Ok(ColumnSource::Library(Box::new(Library { reader, held: Vec::new() })))
+        Ok(ColumnSource::Library(Box::new(BufferedRows { reader, held: Vec::new() })))
     }
 
     fn placed(&self, at: usize, finding: Finding) -> Box<Finding> {
@@ -167,11 +158,12 @@ impl<'a> RowGroup<'a> {
         let columns =
             (0..self.sources.len()).map(|at| self.column(at, count).and_then(|column| self.within(at, column)));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
-        for folder in self.file.folders() {
-            let column = self.layout.position(&folder.column.name).map(|at| &columns[at]);
-            if let Some(finding) = column.and_then(|column| folder.contradiction(self.file.name(), column)) {
-                return Err(Box::new(finding.in_row_group(self.index)));
-            }
+        let contradicted = self.file.folders().iter().find_map(|folder| {
+            let column = &columns[self.layout.position(&folder.column.name)?];
+            folder.contradiction(self.file.name(), column)
+        });
+        if let Some(finding) = contradicted {
+            return Err(Box::new(finding.in_row_group(self.index)));
         }
         if count == 0 {
             self.seen.iter_mut().flatten().for_each(Seen::finish);
@@ -200,27 +192,24 @@ impl<'a> RowGroup<'a> {
         for (at, seen) in self.seen.iter().enumerate() {
             let fault = seen.as_ref().zip(self.described(at)).and_then(|(seen, declared)| seen.fault(declared));
             if let Some((expected, found)) = fault {
-                let finding = Finding::new(Code::CorruptData, self.file.name(), expected, found);
-                return Err(Box::new(finding.in_row_group(self.index).in_column(&self.layout.columns[at].name)));
+                return Err(self.placed(at, Finding::new(Code::CorruptData, self.file.name(), expected, found)));
             }
         }
         Ok(())
     }
 
     fn within(&self, at: usize, column: Column) -> Result<Column, Box<Finding>> {
-        let LayoutColumn { name, kind, known, .. } = &self.layout.columns[at];
+        let LayoutColumn { kind, known, .. } = &self.layout.columns[at];
         if *kind != Kind::String {
             return Ok(column);
         }
         let names = if known.is_some_and(|known| known.constant) { check_names(&column) } else { Ok(()) };
         let place = (self.index, root(self.file, self.layout, at).unwrap_or(usize::MAX));
         let checked = names.and_then(|()| self.file.expansion.rows(place, self.first, &column));
-        let over =
-            |exceeded| Finding::over_budget(self.file.name(), &exceeded).in_row_group(self.index).in_column(name);
-        checked.map(|()| column).map_err(|exceeded| Box::new(over(exceeded)))
+        let over = |exceeded| self.placed(at, Finding::over_budget(self.file.name(), &exceeded));
+        checked.map(|()| column).map_err(over)
     }
 
-    /// The next `count` rows of a column. At the end `count` is 0 and no rows may remain.
     fn column(&mut self, at: usize, count: usize) -> Result<Column, Box<Finding>> {
         let kind = self.layout.columns[at].kind;
         if let ColumnSource::Pages { root, cursor } = &mut self.sources[at] {
@@ -278,18 +267,16 @@ impl<'a> RowGroup<'a> {
         Box::new(finding.in_row_group(self.index))
     }
 
-    /// The reason for refusing a column, found while decoding its rows from `first` on.
     fn refusal(&self, refused: Refused, column: usize, first: usize) -> Box<Finding> {
-        let at_column = |finding: Finding| Box::new(finding.in_column(&self.layout.columns[column].name));
         match refused {
-            Refused::Unreadable(why) => at_column(*corrupt(self.file, self.index, &why)),
+            Refused::Unreadable(why) => self.placed(column, *corrupt(self.file, self.index, &why)),
             Refused::TooLarge { row, value } => {
                 let expected = format!("a number up to {}", i64::MAX);
                 let finding = Finding::new(Code::OutOfRange, self.file.name(), expected, value.to_string());
-                let mut finding = finding.in_row_group(self.index);
+                let mut finding = self.placed(column, finding);
                 finding.episode = self.anew(EPISODE_ID, first).and_then(|ids| ids.text(row).map(str::to_owned));
-                finding = finding.at(self.anew(T, first).and_then(|t| t.int(row)));
-                at_column(finding)
+                finding.t = self.anew(T, first).and_then(|t| t.int(row));
+                finding
             }
         }
     }
@@ -300,7 +287,6 @@ impl<'a> RowGroup<'a> {
         normal_column(decoded.column(0), &held_as(self.layout.columns[at].kind)).ok().map(Column::Flat)
     }
 
-    /// The rows of a column from `first` on, by the library.
     fn reader(&self, root: usize, first: usize) -> Result<CheckedRows, Box<Finding>> {
         let Readable { footer, chunks } = &*self.readable;
         let rows = rows_of(footer.metadata().row_group(self.index));
@@ -316,7 +302,7 @@ impl<'a> RowGroup<'a> {
         let selection = (first > 0).then(|| RowSelection::from(rest));
         let column = ProjectionMask::roots(footer.parquet_schema(), [root]);
         let batch = rows.clamp(1, self.at_a_time);
-        CheckedRows::open(self.file.name(), &library, column, Some(footer.schema().fields()), batch, selection)
+        CheckedRows::open(self.file.name(), &library, column, footer.schema().fields(), batch, selection)
     }
 }
 

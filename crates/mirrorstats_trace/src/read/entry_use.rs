@@ -8,13 +8,11 @@ use mirrorstats_parquet_pages::{Column, Runs};
 #[derive(Clone, Debug)]
 pub(crate) struct EntryUse {
     entries: StringArray,
-    /// The number of rows of each entry.
     rows: Vec<u64>,
     pub(crate) nulls: u64,
 }
 
 impl EntryUse {
-    /// The use of a column's texts; `None` for columns of other types.
     pub(crate) fn of_column(column: &Column) -> Option<Self> {
         let entries = entries(column)?.clone();
         let mut counted = Self { rows: vec![0; entries.len()], entries, nulls: 0 };
@@ -35,12 +33,10 @@ impl EntryUse {
         is_same
     }
 
-    /// All entries.
     pub(crate) fn entries(&self) -> impl Iterator<Item = &str> + Clone {
         self.entries.iter().flatten()
     }
 
-    /// The entries that rows use, with the number of their rows.
     pub(crate) fn used(&self) -> impl Iterator<Item = (&str, u64)> {
         let used = self.entries.iter().zip(&self.rows).filter(|(_, rows)| **rows > 0);
         used.filter_map(|(text, rows)| Some((text?, *rows)))
@@ -75,7 +71,6 @@ impl EntryUse {
         used.filter_map(|((text, first), rows)| Some((text?, first, *rows))).collect()
     }
 
-    /// The bytes of the rows' texts.
     pub(crate) fn bytes(&self) -> u64 {
         self.used().map(|(text, rows)| text.len() as u64 * rows).sum()
     }
@@ -104,7 +99,6 @@ fn entries(column: &Column) -> Option<&StringArray> {
     dictionary.as_dictionary_opt::<Int32Type>()?.values().as_string_opt()
 }
 
-/// Adds the rows of each key, and those without a key.
 pub(crate) fn count<K: ArrowPrimitiveType>(keys: &PrimitiveArray<K>, rows: &mut [u64], nulls: &mut u64) {
     if keys.null_count() > 0 {
         *nulls += keys.null_count() as u64;

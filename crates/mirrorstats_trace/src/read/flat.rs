@@ -1,4 +1,4 @@
-//! Rows of a Parquet file that is not a trace, verified and within the budgets like pages of traces.
+//! The rows of a Parquet file as the file stores them, verified and within the budgets.
 
 use std::fs::File;
 use std::sync::Arc;
@@ -20,7 +20,6 @@ use mirrorstats_parquet_pages::{Expansion, FaultSlot, Library, Store, text_type}
 
 const BATCH_ROWS: usize = 1024;
 
-/// An open file that may be a table.
 pub type TableFile = File;
 
 /// Rows from the library's reader. A panic or an error of the library is a finding of the file.
@@ -35,12 +34,12 @@ impl CheckedRows {
         file: &str,
         library: &Library,
         columns: ProjectionMask,
-        fields: Option<&Fields>,
+        fields: &Fields,
         batch: usize,
         selection: Option<RowSelection>,
     ) -> Result<Self, Box<Finding>> {
         let slot = Arc::clone(&library.slot);
-        let made = contained(|| library.reader(columns, fields, batch, selection));
+        let made = contained(|| library.reader(columns, Some(fields), batch, selection));
         match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
             Ok(reader) => Ok(Self { file: file.to_owned(), reader, slot }),
             Err(error) => Err(Box::new(damaged(file, &slot, &error))),
@@ -63,12 +62,15 @@ pub fn flat_rows(
     file: TableFile,
     metadata: Arc<ParquetMetaData>,
 ) -> Result<impl Iterator<Item = Result<RecordBatch, String>>, String> {
-    let columns = metadata.file_metadata().schema_descr().columns();
-    if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
-        return Err(words(&is_nested("", &nested.path().parts()[0])));
-    }
+    check_flat("", &metadata).map_err(|finding| words(&finding))?;
     let rows = table_rows("", file, metadata, ChunkChecksums::default(), None).map_err(|finding| words(&finding))?;
     Ok(rows.map(|batch| batch.map_err(|finding| words(&finding))))
+}
+
+pub(crate) fn check_flat(name: &str, metadata: &ParquetMetaData) -> Result<(), Box<Finding>> {
+    let columns = metadata.file_metadata().schema_descr().columns();
+    let nested = columns.iter().map(|column| column.path().parts()).find(|parts| parts.len() > 1);
+    nested.map_or(Ok(()), |parts| Err(Box::new(is_nested(name, &parts[0]))))
 }
 
 /// The rows of these columns of a file, by their positions; of all columns if `None`.
@@ -78,6 +80,19 @@ pub fn table_rows(
     metadata: Arc<ParquetMetaData>,
     checksums: ChunkChecksums,
     roots: Option<&[usize]>,
+) -> Result<CheckedRows, Box<Finding>> {
+    let row_groups = (0..metadata.num_row_groups()).collect();
+    rows_of_part(name, file, metadata, checksums, roots, row_groups, None)
+}
+
+pub(crate) fn rows_of_part(
+    name: &str,
+    file: TableFile,
+    metadata: Arc<ParquetMetaData>,
+    checksums: ChunkChecksums,
+    roots: Option<&[usize]>,
+    row_groups: Vec<usize>,
+    selection: Option<RowSelection>,
 ) -> Result<CheckedRows, Box<Finding>> {
     let bytes = file.metadata().map_err(|error| Finding::unreadable(name, &error))?.len();
     let schema = metadata.file_metadata().schema_descr_ptr();
@@ -90,11 +105,10 @@ pub fn table_rows(
         .and_then(|fields| fields.map_err(|error| plain(&error)))
         .map_err(|error| damaged(name, &slot, &error))?;
     let fields: Fields = fields.fields().iter().map(with_keys).collect();
-    let row_groups = (0..metadata.num_row_groups()).collect();
     let store = Store::new(file, Arc::new(Expansion::new(bytes)));
     let library = Library { store, metadata, checksums, row_groups, slot, writes_out: true };
     let mask = roots.map_or_else(ProjectionMask::all, |roots| ProjectionMask::roots(&schema, roots.iter().copied()));
-    CheckedRows::open(name, &library, mask, Some(&fields), BATCH_ROWS, None)
+    CheckedRows::open(name, &library, mask, &fields, BATCH_ROWS, selection)
 }
 
 /// Texts inside of nested columns as keys into a dictionary: the pages of nested columns are not checked for texts that

@@ -1,8 +1,7 @@
-use std::collections::BTreeMap;
+use std::collections::VecDeque;
 use std::num::NonZeroUsize;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
-use std::thread;
+use std::panic::resume_unwind;
+use std::thread::{self, ScopedJoinHandle};
 
 /// Runs all jobs, `threads` at a time, and passes the results to `sink` in the order of the jobs. If no thread can be
 /// started, the calling thread does the work.
@@ -16,49 +15,25 @@ pub fn in_order<J: Sync, T: Send, E>(
     if threads < 2 {
         return jobs.iter().try_for_each(|job| sink(work(job)));
     }
-    let next = &AtomicUsize::new(0);
     let work = &work;
-    let (give, take) = mpsc::channel();
+    let joined = |running: ScopedJoinHandle<'_, T>| running.join().unwrap_or_else(|panic| resume_unwind(panic));
     thread::scope(|scope| {
-        // The calling thread works too; results wait in the channel meanwhile.
-        for _ in 1..threads {
-            let give = give.clone();
-            let worker = move || {
-                while let Some((at, job)) = claim(next, jobs) {
-                    if give.send((at, work(job))).is_err() {
-                        return;
-                    }
-                }
-            };
-            if thread::Builder::new().spawn_scoped(scope, worker).is_err() {
-                break;
+        let mut running = VecDeque::new();
+        for job in jobs {
+            if running.len() == threads
+                && let Some(first) = running.pop_front()
+            {
+                sink(joined(first))?;
+            }
+            if let Ok(thread) = thread::Builder::new().spawn_scoped(scope, move || work(job)) {
+                running.push_back(thread);
+            } else {
+                running.drain(..).try_for_each(|first| sink(joined(first)))?;
+                sink(work(job))?;
             }
         }
-        drop(give);
-        let mut waiting = BTreeMap::new();
-        for wanted in 0..jobs.len() {
-            let result = loop {
-                if let Some(result) = waiting.remove(&wanted) {
-                    break result;
-                }
-                let (at, result) = match take.try_recv() {
-                    Ok(other) => other,
-                    Err(_) => match claim(next, jobs) {
-                        Some((at, job)) => (at, work(job)),
-                        None => take.recv().expect("a job is done by whoever has begun it, unless it panicked"),
-                    },
-                };
-                waiting.insert(at, result);
-            };
-            sink(result).inspect_err(|_| next.store(jobs.len(), Ordering::Relaxed))?;
-        }
-        Ok(())
+        running.into_iter().try_for_each(|first| sink(joined(first)))
     })
-}
-
-fn claim<'a, J>(next: &AtomicUsize, jobs: &'a [J]) -> Option<(usize, &'a J)> {
-    let at = next.fetch_add(1, Ordering::Relaxed);
-    jobs.get(at).map(|job| (at, job))
 }
 
 #[cfg(test)]

@@ -2,10 +2,6 @@
 
 use std::sync::Arc;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch};
-use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Schema};
-
 pub use super::footer::columns::FileColumn;
 pub use super::footer::trace_file::TraceFile;
 use crate::beside::labels::Labels;
@@ -21,7 +17,6 @@ pub struct TraceSet {
     label_columns: Vec<String>,
 }
 
-/// The type and presence of a column over all files of a set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ColumnUse {
     /// The logical type, the same in all files that have the column; [`Kind::Unsupported`] if they differ.
@@ -30,7 +25,6 @@ pub struct ColumnUse {
     pub missing_from: Option<String>,
     /// True if its type in every file that has it says that it holds only nulls; it then fits any declared type.
     pub is_null: bool,
-    /// Two files that disagree on the type, with their types.
     pub conflict: Option<[(String, Kind); 2]>,
 }
 
@@ -62,7 +56,6 @@ impl TraceSet {
         if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
     }
 
-    /// The schema's column of this name in these files; `None` for an own column.
     pub fn schema_column(&self, name: &str) -> Option<&'static Column> {
         schema::column(name).filter(|_| self.domain() == Domain::Mirror || self.declares(name))
     }
@@ -84,7 +77,6 @@ impl TraceSet {
         Arc::clone(&self.files)
     }
 
-    /// The use of a column over all files; `None` if no file and no label has it.
     pub fn column(&self, name: &str) -> Option<ColumnUse> {
         if self.is_label_column(name) {
             return Some(ColumnUse { kind: Kind::Bool, missing_from: None, is_null: false, conflict: None });
@@ -118,8 +110,7 @@ impl TraceSet {
         let known = COLUMNS.iter().filter(|column| self.domain().has(column)).map(|column| column.name);
         let mut names: Vec<&str> =
             known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
-        let all = |file| TraceFile::columns(file).iter().chain(file.folders().iter().map(|folder| &folder.column));
-        for column in self.files.iter().flat_map(all) {
+        for column in self.files.iter().flat_map(TraceFile::all_columns) {
             if !names.contains(&column.name.as_str()) {
                 names.push(&column.name);
             }
@@ -141,34 +132,11 @@ impl TraceSet {
         &self.labels
     }
 
-    /// The columns of the labels: true, false or null in each episode.
     pub fn label_columns(&self) -> &[String] {
         &self.label_columns
     }
 
     pub fn is_label_column(&self, name: &str) -> bool {
         self.label_columns.iter().any(|column| column == name)
-    }
-
-    pub(crate) fn with_label_columns(
-        &self,
-        episodes: RecordBatch,
-        columns: &[&str],
-    ) -> Result<RecordBatch, TraceError> {
-        if columns.is_empty() {
-            return Ok(episodes);
-        }
-        let ids = episodes.column_by_name("episode_id").expect("every batch names its episodes");
-        let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
-        let ids = ids.as_string::<i32>();
-        let mut fields: Vec<Field> =
-            episodes.schema_ref().fields().iter().map(|field| field.as_ref().clone()).collect();
-        let mut arrays = episodes.columns().to_vec();
-        for column in columns {
-            let values: BooleanArray = ids.iter().map(|id| self.labels.value(column, id?)).collect();
-            fields.push(Field::new(*column, values.data_type().clone(), true));
-            arrays.push(Arc::new(values) as ArrayRef);
-        }
-        RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays).map_err(TraceError::Memory)
     }
 }

@@ -45,12 +45,7 @@ impl Episodes {
     }
 
     pub(crate) fn row_group(&self, row: usize) -> usize {
-        self.place(row).0
-    }
-
-    pub(crate) fn place(&self, row: usize) -> (usize, usize) {
-        let piece = self.pieces[self.pieces.partition_point(|piece| piece.at <= row) - 1];
-        (piece.row_group, piece.row + (row - piece.at))
+        self.pieces[self.pieces.partition_point(|piece| piece.at <= row) - 1].row_group
     }
 
     pub(crate) fn id(&self, row: usize) -> Option<&str> {
@@ -69,12 +64,9 @@ pub(crate) enum ScanEvent<T> {
     Fault(Box<Finding>),
 }
 
-/// The parts of a row group, in this order: at most one head, wholes, a tail or a fault.
 enum ScanPart<T> {
-    /// The first episode's rows, which may continue the row group before.
     Head(Vec<Rows>),
     Whole(T, usize),
-    /// The last episode's rows, which may continue in the next row group.
     Tail(Vec<Rows>),
     Fault(Box<Finding>),
 }
@@ -381,7 +373,6 @@ fn unjoined(file: &TraceFile, parts: &[Rows], why: String) -> Box<Finding> {
     Box::new(finding.in_row_group(parts[0].row_group))
 }
 
-/// The rows at which an episode starts, row 0 first.
 fn starts(rows: &Rows) -> Vec<usize> {
     let differ = |row: &usize| rows.episode(*row) != rows.episode(row - 1);
     let mut starts = vec![0];

@@ -21,7 +21,6 @@ pub(crate) struct LayoutColumn {
     pub(crate) name: String,
     pub(crate) kind: Kind,
     pub(crate) known: Option<&'static Column>,
-    /// True if it must be constant in an episode.
     pub(crate) constant: bool,
     pub(crate) values: Vec<String>,
     /// True if it holds only nulls in all files, of no type.

@@ -19,11 +19,9 @@ const AROUND: usize = 40;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
-    /// The first step with a match.
     pub t: i64,
     pub column: String,
     pub excerpt: String,
-    /// The number of steps with a match.
     pub steps: usize,
 }
 
@@ -66,7 +64,6 @@ pub fn search(set: &TraceSet, words: &str, threads: NonZeroUsize) -> Result<BTre
     Ok(found)
 }
 
-/// Some text around words, which are in lower case; `None` if the text does not contain them.
 fn excerpt(text: &str, words: &str) -> Option<String> {
     let small = text.to_lowercase();
     let at = small.find(words)?;

@@ -122,7 +122,6 @@ impl Seen {
         }
     }
 
-    /// Takes up the texts, at the end of the rows.
     pub(crate) fn finish(&mut self) {
         let Some(texts) = self.texts.take() else { return };
         self.nulls += texts.nulls;

@@ -32,9 +32,7 @@ const AHEAD: usize = 4;
 /// An error ends the iteration. One thread per row group decodes ahead.
 pub struct Steps {
     selection: StepSelection,
-    /// The row groups that are not started, with their files.
     left: vec::IntoIter<(usize, usize)>,
-    /// The batches of the row groups that are being decoded, with their files.
     ahead: VecDeque<(usize, Receiver<Batch>)>,
     /// Held so that a file's footer is read once for all its row groups.
     footer: Option<Arc<Readable>>,

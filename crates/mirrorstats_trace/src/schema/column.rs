@@ -1,52 +1,71 @@
 use arrow::datatypes::DataType;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
-use super::field_access::{Access, Value, access};
 use crate::diagnostic::Code;
-use crate::episodes::answers::{Answered, is_answer};
-use crate::episodes::episode::Episode;
 
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a key of the domain's file")]
 pub struct Column {
-    pub name: &'static str,
+    #[serde(skip_deserializing)]
+    pub name: Text,
     /// The stored type; readers accept any type of the same [`Kind`].
     #[serde(rename = "type")]
     pub stored: Stored,
     /// True if every trace has the column.
+    #[serde(default)]
     pub required: bool,
+    #[serde(default)]
     pub nullable: bool,
     /// True if the value is the same in all rows of an episode.
+    #[serde(default)]
     pub constant: bool,
-    pub unit: Option<&'static str>,
-    pub doc: &'static str,
+    #[serde(default, deserialize_with = "optional_text")]
+    pub unit: Option<Text>,
+    #[serde(rename(deserialize = "help"), deserialize_with = "text")]
+    pub doc: Text,
+    #[serde(default, deserialize_with = "texts")]
     pub values: &'static [&'static str],
     /// The value if a trace has no such column or a row has no value: an expression in the language of definitions.
     /// `null` means that a missing column equals a column without values, so that definitions may read it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub default: Option<&'static str>,
-    #[serde(skip)]
+    #[serde(default, deserialize_with = "optional_text", skip_serializing_if = "Option::is_none")]
+    pub default: Option<Text>,
+    #[serde(skip_serializing)]
     pub rule: Option<Code>,
-    #[serde(skip)]
+    #[serde(skip_serializing)]
     pub color: Option<ColorColumn>,
     /// True if it counts something, so that negative numbers are faults.
     #[serde(skip)]
     pub counts: bool,
-    #[serde(skip)]
+    #[serde(rename(deserialize = "task"), default, skip_serializing)]
     pub(crate) is_of_some_tasks: bool,
-    #[serde(skip)]
-    pub(super) is_mark: bool,
-    #[serde(skip)]
-    pub(super) scope: Scope,
-    #[serde(skip)]
-    pub(super) access: Access,
+    #[serde(rename(deserialize = "mark"), default, skip_serializing)]
+    pub(crate) is_mark: bool,
+    #[serde(rename(deserialize = "in"), default, skip_serializing)]
+    pub(crate) scope: Scope,
 }
 
-/// The traces in which a column has the meaning of the schema.
+/// A text that is kept until the process ends, since there is only one table of columns. The alias keeps Serde from
+/// borrowing it.
+type Text = &'static str;
+
+fn text<'de, D: Deserializer<'de>>(from: D) -> Result<Text, D::Error> {
+    String::deserialize(from).map(|text| &*text.leak())
+}
+
+fn optional_text<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Text>, D::Error> {
+    text(from).map(Some)
+}
+
+fn texts<'de, D: Deserializer<'de>>(from: D) -> Result<&'static [Text], D::Error> {
+    let texts = Vec::<String>::deserialize(from)?;
+    Ok(texts.into_iter().map(|text| &*text.leak()).collect::<Vec<_>>().leak())
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Scope {
+pub(crate) enum Scope {
     /// Every trace, which must have it.
     Every,
     /// Traces of any domain, if it has the schema's type.
@@ -55,18 +74,22 @@ pub(super) enum Scope {
     Mirror,
 }
 
-/// The colours in a column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ColorColumn {
-    pub name: &'static str,
+    #[serde(skip)]
+    pub name: Text,
     /// The one of [`WORDS`](super::colors::spelling::WORDS) that the column allows.
-    pub word: Option<&'static str>,
-    pub(super) advice: &'static str,
+    #[serde(default, deserialize_with = "optional_text")]
+    pub word: Option<Text>,
+    #[serde(deserialize_with = "text")]
+    pub(super) advice: Text,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stored {
+    #[default]
     Bool,
     Int8,
     Int32,
@@ -142,7 +165,6 @@ impl Stored {
         }
     }
 
-    /// The smallest and largest integer of the type, if it is an integer type.
     pub const fn range(self) -> Option<(i64, i64)> {
         match self {
             Self::Int8 => Some((i8::MIN as i64, i8::MAX as i64)),
@@ -162,45 +184,19 @@ impl PartialEq for Column {
 impl Eq for Column {}
 
 impl Column {
+    /// The column of this name, with the units of `counted` as counts.
+    pub(super) fn named(mut self, name: &'static str, counted: &[String]) -> Self {
+        self.name = name;
+        self.nullable |= !self.required;
+        self.counts = self.unit.is_some_and(|unit| counted.iter().any(|counted| counted == unit));
+        self.color = self.color.map(|color| ColorColumn { name, ..color });
+        self
+    }
+
     /// The meaning of a missing value, if it is a text or a number and not an expression over other columns.
     pub fn default_text(&self) -> Option<&'static str> {
         let text = self.default?;
         let quoted = text.strip_prefix('\'').and_then(|text| text.strip_suffix('\''));
         quoted.or_else(|| text.bytes().all(|byte| byte.is_ascii_digit()).then_some(text))
-    }
-
-    pub(crate) fn of_answer(name: &'static str, stored: Stored) -> Self {
-        Self {
-            name,
-            stored,
-            required: false,
-            nullable: true,
-            constant: false,
-            unit: None,
-            doc: "An answer that the experiment declares, or what it should be.",
-            values: &[],
-            default: None,
-            rule: None,
-            color: None,
-            counts: false,
-            is_of_some_tasks: false,
-            is_mark: false,
-            scope: Scope::Any,
-            access: access(name),
-        }
-    }
-
-    /// The values of all steps; `None` for null.
-    pub fn of_steps<'a>(&self, episode: &'a Episode) -> impl Iterator<Item = Option<Value<'a>>> {
-        let (get, answer) = (self.access.get, is_answer(self.name).then_some(self.name));
-        (0..episode.steps.len()).map(move |at| match answer {
-            Some(name) => episode.steps[at].extra.answers.get(name).map(Answered::value),
-            None => get(episode, at),
-        })
-    }
-
-    /// Sets the value at a step index; returns false and changes nothing if the field cannot hold it.
-    pub(crate) fn put(&self, episode: &mut Episode, at: usize, value: Option<Value<'_>>) -> bool {
-        (self.access.set)(episode, at, value)
     }
 }

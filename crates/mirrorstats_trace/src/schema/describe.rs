@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use crate::diagnostic::{Code, Severity};
 use crate::schema::{COLUMNS, Column, SCHEMA_VERSION};
 
-/// A key of the footer.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MetadataKey {
@@ -38,7 +37,6 @@ pub struct SchemaDocument {
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RuleDescription {
     pub code: Code,
-    /// True if breaking it makes a trace unusable.
     pub severity: Severity,
     pub rule: &'static str,
     pub help: &'static str,

@@ -8,13 +8,14 @@ pub mod colors;
 mod column;
 pub mod describe;
 pub mod domain;
-mod field_access;
 pub mod rules;
+mod value;
 
+pub(crate) use column::Scope;
 pub use column::{Column, Kind, Stored};
 pub use domain::{COLUMNS, DeclaredColumn, Domain, column};
-pub use field_access::Value;
-pub(crate) use field_access::value_at;
+pub use value::Value;
+pub(crate) use value::value_at;
 
 /// The schema version of every trace that this program writes.
 pub const SCHEMA_VERSION: u32 = 2;

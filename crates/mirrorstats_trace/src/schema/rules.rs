@@ -20,27 +20,21 @@ pub enum Requirement<'a> {
     Present,
     Name,
     OneOf(&'static [&'static str]),
-    /// One of the texts that the definitions declare.
     Among(&'a [String]),
     Color(ColorColumn, Option<&'a Palette>),
-    /// An integer within these bounds of a type.
     Within(i64, i64, &'static str),
     Count,
     Constant,
     /// A known experiment; another rule requires a name.
     Experiment(&'a [String]),
-    /// 1 in the first row of an episode.
     FromOne,
     Once,
-    /// No gaps in the numbers.
     WithoutGap,
 }
 
-/// The limits on values beyond the schema.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Known<'a> {
     pub palette: Option<&'a Palette>,
-    /// The experiments that the definitions know; any if `None`.
     pub experiments: Option<&'a [String]>,
 }
 

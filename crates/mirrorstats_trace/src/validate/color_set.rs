@@ -6,15 +6,16 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZeroUsize;
 
 use arrow::array::AsArray as _;
-use indexmap::IndexSet;
+use indexmap::map::Entry;
+use indexmap::{IndexMap, IndexSet};
 
 use crate::diagnostic::{Code, Finding};
-use crate::episodes::palette::Color;
 use crate::error::TraceError;
 use crate::read::entry_use::EntryUse;
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::{Episodes, ScanEvent, pass};
 use crate::read::projection::{Layout, T};
+use crate::schema::colors::Color;
 use crate::schema::colors::palette::Palette;
 use crate::schema::colors::spelling::{WORDS, did_you_mean, meant_by, most_like, spelling_key};
 use crate::schema::colors::{ColorColumn, column};
@@ -33,15 +34,11 @@ pub(crate) struct Sighting {
     t: Option<i64>,
 }
 
-/// All colours of some inputs that pass the checks of single values.
 #[derive(Default)]
 pub(crate) struct Tally {
     declared: BTreeSet<String>,
-    /// Colours of bodies and cubes, in the order of their first rows.
     seen: IndexSet<String>,
-    /// Undeclared colours by column, in the order of their first rows.
-    met: Vec<(usize, Sighting)>,
-    places: HashMap<(&'static str, String), usize>,
+    met: IndexMap<(&'static str, String), (usize, Sighting)>,
 }
 
 /// The colours of some episodes by column, in the order of their first rows.
@@ -102,12 +99,9 @@ impl Tally {
             if files[file].colors.has(&sighting.name) {
                 continue;
             }
-            let key = (sighting.column.name, sighting.name.clone());
-            if let Some(place) = self.places.get(&key) {
-                self.met[*place].1.rows += sighting.rows;
-            } else {
-                self.places.insert(key, self.met.len());
-                self.met.push((file, sighting));
+            match self.met.entry((sighting.column.name, sighting.name.clone())) {
+                Entry::Occupied(mut first) => first.get_mut().1.rows += sighting.rows,
+                Entry::Vacant(place) => drop(place.insert((file, sighting))),
             }
         }
     }
@@ -119,7 +113,7 @@ impl Tally {
         for name in self.declared.iter().chain(&self.seen) {
             spelled.entry(spelling_key(name)).or_insert(name);
         }
-        let found = self.met.iter().filter_map(|(file, sighting)| {
+        let found = self.met.values().filter_map(|(file, sighting)| {
             let right = spelled.get(&spelling_key(&sighting.name)).copied();
             let finding = respelled(sighting, &files[*file], right).or_else(|| self.unseen(sighting, &files[*file]));
             finding.map(|finding| (*file, finding))

@@ -29,9 +29,9 @@ fn hash(id: &str) -> u64 {
 }
 
 #[derive(Default)]
-pub(crate) struct Prints(Vec<u64>);
+pub(crate) struct IdHashes(Vec<u64>);
 
-impl Prints {
+impl IdHashes {
     pub(crate) fn add(&mut self, hashes: &[u64]) {
         self.0.extend_from_slice(hashes);
     }

@@ -4,6 +4,7 @@
 //! checksums are checked like all others.
 
 pub(crate) mod color_set;
+pub mod copies;
 pub(crate) mod duplicate_ids;
 pub(crate) mod episode_hashes;
 pub mod replies;
@@ -13,23 +14,23 @@ use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 
 use arrow::array::LargeStringBuilder;
-use indexmap::IndexSet;
+use indexmap::{IndexMap, IndexSet};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::copies::{Copied, copies};
 use super::diagnostic::{Code, Finding, Severity};
 use super::episodes::answers;
 use super::error::TraceError;
 use super::inputs::Input;
 use super::read::open::{TraceFile, TraceSet};
 use super::read::parallel_scan::{Episodes, ScanEvent, pass};
-use super::read::prints;
 use super::read::projection::Layout;
+use super::read::row_hashes;
 use super::read::verify::verify_columns;
 use super::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 use super::validate::replies::{REPLY_STATUS, ReplyCounts, statuses};
 use color_set::{Tally, sightings};
+use copies::{Copied, copies};
 use duplicate_ids::{SeenIds, Start, starts};
 use mirrorstats_parquet_pages::checksums::Checksums;
 use rules::{Located, Rules};
@@ -66,7 +67,6 @@ pub struct Rest<'a> {
 }
 
 impl Validation {
-    /// The error with the findings that are errors, the earliest first.
     pub fn errors(self) -> Result<(), TraceError> {
         let errors = self.findings.into_iter().filter(|finding| finding.severity == Severity::Error);
         TraceError::from_findings(errors.collect()).map_or(Ok(()), Err)
@@ -78,8 +78,7 @@ impl Validation {
 
     /// The first `limit` findings of each file and rule, and the number of others.
     pub fn abridged(&self, limit: usize) -> (Vec<&Finding>, Vec<Rest<'_>>) {
-        let (mut shown, mut rest) = (Vec::new(), Vec::<Rest>::new());
-        let mut counts = indexmap::IndexMap::<_, usize>::new();
+        let (mut shown, mut counts) = (Vec::new(), IndexMap::<_, usize>::new());
         for finding in &self.findings {
             let count = counts.entry((finding.file.as_str(), finding.code)).or_default();
             *count += 1;
@@ -87,12 +86,8 @@ impl Validation {
                 shown.push(finding);
             }
         }
-        for ((file, code), count) in counts {
-            if count > limit {
-                rest.push(Rest { file, code, count: count - limit });
-            }
-        }
-        (shown, rest)
+        let rest = counts.into_iter().filter(|(_, count)| *count > limit);
+        (shown, rest.map(|((file, code), count)| Rest { file, code, count: count - limit }).collect())
     }
 }
 
@@ -130,14 +125,8 @@ pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsi
     for (input, file) in inputs.iter().zip(files) {
         let checksums = file.as_ref().map(TraceFile::checksums).unwrap_or_default();
         let about = CheckedFile { name: input.name.clone(), complete: file.is_ok(), episodes: 0, steps: 0, checksums };
-        let findings = match file {
-            Ok(file) => {
-                opened.push(file);
-                places.push(checks.len());
-                Vec::new()
-            }
-            Err(findings) => findings,
-        };
+        places.extend(file.is_ok().then_some(checks.len()));
+        let findings = file.map(|file| opened.push(file)).err().unwrap_or_default();
         checks.push(FileCheck { file: about, findings, replies: ReplyCounts::default() });
     }
     let set = TraceSet::from_files(opened);
@@ -206,18 +195,6 @@ fn check_rows(
 ) -> Result<(), TraceError> {
     let known = COLUMNS.iter().filter(|column| set.domain().has(column)).map(|column| column.name);
     let declared = expected.declared.iter().filter(|_| set.domain() == Domain::Own).map(|own| own.name.as_str());
-    let mut answers: Vec<DeclaredColumn> = Vec::new();
-    for own in set.files().iter().flat_map(TraceFile::experiments).flat_map(|experiment| &experiment.answers) {
-        match answers.iter_mut().find(|known| known.name == own.name) {
-            // Two experiments may give a key different options.
-            Some(known) if known.values.is_empty() || own.values.is_empty() => known.values.clear(),
-            Some(known) => {
-                let new: Vec<_> = own.values.iter().filter(|value| !known.values.contains(value)).cloned().collect();
-                known.values.extend(new);
-            }
-            None => answers.push(own.clone()),
-        }
-    }
     let names = set.column_names();
     let is_readable = |name: &&str| set.column(name).is_some_and(|column| column.kind != Kind::Unsupported);
     let asked = answers::among(&names).into_iter().filter(is_readable);
@@ -227,7 +204,7 @@ fn check_rows(
     }
     let mut layout = Layout::new(set, present, [])?;
     layout.with_declared(expected.declared);
-    layout.with_declared(&answers);
+    layout.with_declared(&declared_answers(set));
     let rules = Rules { layout: &layout, experiments: expected.experiments };
     let statuses = layout.position(REPLY_STATUS).filter(|at| layout.columns[*at].known.is_some());
     let name = |file: usize| set.files()[file].name().to_owned();
@@ -239,10 +216,10 @@ fn check_rows(
         let replies = statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at]));
         // An episode without an id has another finding.
         let is_whole = !expected.errors_alone && starts.len() == episodes.len();
-        let prints = if is_whole { prints::of_episodes(&layout, &episodes) } else { Vec::new() };
+        let hashes = if is_whole { row_hashes::of_episodes(&layout, &episodes) } else { Vec::new() };
         let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
         let rows = (episodes.len() as u64, episodes.columns[0].len() as u64);
-        (found, colors, starts, prints, replies, rows)
+        (found, colors, starts, hashes, replies, rows)
     };
     let (mut ids, mut tally) = (SeenIds::default(), Tally::new(set.files()));
     let mut copy_candidates = CopyCandidates::default();
@@ -253,10 +230,10 @@ fn check_rows(
                 check.file.complete = false;
                 check.findings.push(*finding);
             }
-            ScanEvent::Whole((found, colors, starts, prints, replies, (episodes, steps))) => {
+            ScanEvent::Whole((found, colors, starts, hashes, replies, (episodes, steps))) => {
                 tally.add(set.files(), file, colors);
-                if !prints.is_empty() {
-                    copy_candidates.add(file, prints, &starts);
+                if !hashes.is_empty() {
+                    copy_candidates.add(file, hashes, &starts);
                 }
                 check.file.episodes += episodes;
                 check.file.steps += steps;
@@ -272,36 +249,50 @@ fn check_rows(
     Ok(())
 }
 
+/// The columns of all declared answers. Two experiments may give a key different options.
+fn declared_answers(set: &TraceSet) -> Vec<DeclaredColumn> {
+    let mut answers: Vec<DeclaredColumn> = Vec::new();
+    for own in set.files().iter().flat_map(TraceFile::experiments).flat_map(|experiment| &experiment.answers) {
+        match answers.iter_mut().find(|known| known.name == own.name) {
+            Some(known) if known.values.is_empty() || own.values.is_empty() => known.values.clear(),
+            Some(known) => {
+                let new: Vec<_> = own.values.iter().filter(|value| !known.values.contains(value)).cloned().collect();
+                known.values.extend(new);
+            }
+            None => answers.push(own.clone()),
+        }
+    }
+    answers
+}
+
 /// The episodes whose rows may equal those of another one, with their files. Ids are stored together, because one
 /// allocation for each took memory and time: 132 MB for 300,000 episodes instead of 84.
 #[derive(Default)]
 struct CopyCandidates {
-    prints: Vec<u64>,
+    hashes: Vec<u64>,
     ids: LargeStringBuilder,
-    /// The number of episodes up to the end of each file.
     ends: Vec<(usize, usize)>,
 }
 
 impl CopyCandidates {
-    fn add(&mut self, file: usize, prints: Vec<u64>, starts: &[Start]) {
-        self.prints.extend(prints);
+    fn add(&mut self, file: usize, hashes: Vec<u64>, starts: &[Start]) {
+        self.hashes.extend(hashes);
         for start in starts {
             self.ids.append_value(&start.id);
         }
-        self.ends.push((self.prints.len(), file));
+        self.ends.push((self.hashes.len(), file));
     }
 
     fn episodes(mut self) -> BTreeMap<String, usize> {
         let ids = self.ids.finish();
-        let mut order: Vec<usize> = (0..self.prints.len()).collect();
-        order.sort_unstable_by_key(|at| self.prints[*at]);
-        let same = order.chunk_by(|a, b| self.prints[*a] == self.prints[*b]).filter(|same| same.len() > 1).flatten();
+        let mut order: Vec<usize> = (0..self.hashes.len()).collect();
+        order.sort_unstable_by_key(|at| self.hashes[*at]);
+        let same = order.chunk_by(|a, b| self.hashes[*a] == self.hashes[*b]).filter(|same| same.len() > 1).flatten();
         let file = |at: usize| self.ends[self.ends.partition_point(|(end, _)| *end <= at)].1;
         same.map(|at| (ids.value(*at).to_owned(), file(*at))).collect()
     }
 }
 
-/// The copies, each with its file. Unreadable files have other findings.
 fn copied(set: &TraceSet, copy_candidates: CopyCandidates, threads: NonZeroUsize) -> Vec<(usize, Finding)> {
     let files = copy_candidates.episodes();
     let found = copies(set, &files.keys().cloned().collect(), threads).unwrap_or_default();

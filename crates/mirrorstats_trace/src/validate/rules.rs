@@ -12,7 +12,7 @@ use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
 use crate::read::projection::{BODY_COLOR, EPISODE_ID, Layout, LayoutColumn, T};
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
-use crate::schema::{Kind, Value, value_at};
+use crate::schema::{Kind, value_at};
 use mirrorstats_exact::escape::exact;
 use mirrorstats_exact::suggest::nearest;
 use mirrorstats_parquet_pages::{Column as Held, text_at};
@@ -24,7 +24,6 @@ pub(crate) struct Located {
 
 pub(crate) struct Rules<'a> {
     pub(crate) layout: &'a Layout,
-    /// The experiments that the definitions know; any if `None`.
     pub(crate) experiments: Option<&'a [String]>,
 }
 
@@ -253,11 +252,5 @@ fn valid(values: &Int64Array, row: usize) -> Option<i64> {
 }
 
 fn shown(values: &ArrayRef, row: usize) -> String {
-    match value_at(values, row) {
-        None => "null".into(),
-        Some(Value::Bool(truth)) => truth.to_string(),
-        Some(Value::Int(number)) => number.to_string(),
-        Some(Value::Float(number)) => number.to_string(),
-        Some(Value::Text(text)) => format!("`{}`", exact(text)),
-    }
+    value_at(values, row).map_or_else(|| "null".to_owned(), |value| value.shown(exact))
 }

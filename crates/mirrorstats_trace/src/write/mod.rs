@@ -5,7 +5,6 @@
 //! one. The optional columns of a file are declared when it is created, so that memory stays flat. Values for
 //! undeclared columns are refused, never dropped.
 
-pub(crate) mod decode_episode;
 pub mod merge;
 pub mod row_groups;
 pub mod seal;
@@ -32,7 +31,6 @@ pub struct TraceMetadata {
     pub columns: OptionalColumns,
 }
 
-/// Optional columns of a trace, in schema order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OptionalColumns {
     given: Vec<&'static Column>,
@@ -115,7 +113,6 @@ impl OptionalColumns {
 
 /// Writes a trace, to a file that appears under its name with [`commit`](TraceWriter::commit), or to any other output.
 pub struct TraceWriter<W: Write + Send> {
-    /// The name of the output in errors.
     path: PathBuf,
     file: RowGroups<W>,
     columns: Vec<&'static Column>,
@@ -239,18 +236,9 @@ fn expected(rule: &Rule<'_>) -> String {
 fn found(rule: &Rule<'_>, value: Value<'_>) -> String {
     match (rule.asks, value) {
         (Requirement::Color(color, palette), Value::Text(text)) => {
-            format!("{} ({})", shown(value), color.help(text, palette))
+            format!("{} ({})", value.shown(visible), color.help(text, palette))
         }
-        _ => shown(value),
-    }
-}
-
-fn shown(value: Value<'_>) -> String {
-    match value {
-        Value::Bool(truth) => truth.to_string(),
-        Value::Int(number) => number.to_string(),
-        Value::Float(number) => number.to_string(),
-        Value::Text(text) => format!("`{}`", visible(text)),
+        _ => value.shown(visible),
     }
 }
 
@@ -262,7 +250,6 @@ fn refused(episode: &Episode, expected: String, found: String) -> Result<(), Tra
     Err(TraceError::Refused { episode: episode.episode_id.clone(), expected, found })
 }
 
-/// Writes these episodes as one trace file with the optional columns that they use.
 pub fn write_episodes(
     path: &Path,
     recording: Option<serde_json::Value>,

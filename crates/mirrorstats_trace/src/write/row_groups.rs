@@ -51,8 +51,12 @@ impl<W: Write + Send> RowGroups<W> {
     }
 
     pub fn end_episode(&mut self, gathered: &mut Gathered) -> Result<()> {
-        let is_full = self.rows + gathered.rows >= ROW_GROUP_ROWS;
-        if is_full || gathered.rows >= GATHERED_ROWS { self.write(&gathered.take()?) } else { Ok(()) }
+        if self.is_due(gathered.rows) { self.write(&gathered.take()?) } else { Ok(()) }
+    }
+
+    /// Returns true if this many gathered rows are written at the end of an episode.
+    pub const fn is_due(&self, gathered: usize) -> bool {
+        self.rows + gathered >= ROW_GROUP_ROWS || gathered >= GATHERED_ROWS
     }
 
     pub fn write(&mut self, rows: &RecordBatch) -> Result<()> {
@@ -122,7 +126,6 @@ impl Values {
         }
     }
 
-    /// Adds a value; `None` if it is of another type.
     #[must_use]
     pub fn push(&mut self, value: Option<Value<'_>>) -> Option<()> {
         match (self, value) {

@@ -75,7 +75,6 @@ pub fn seal(trace: &Input, out: &Path, threads: NonZeroUsize) -> Result<SealAnsw
     Ok(SealAnswer { name: trace.name.clone(), out: copy.name, episodes, steps, checksums_before, sha256 })
 }
 
-/// Checks every rule of the schema; returns the numbers of episodes and steps.
 fn sound(input: &Input, threads: NonZeroUsize) -> Result<(u64, u64), TraceError> {
     let checked = validate(slice::from_ref(input), None, threads)?;
     let counts = checked.files.first().map_or((0, 0), |file| (file.episodes, file.steps));

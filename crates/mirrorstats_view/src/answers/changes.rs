@@ -13,11 +13,11 @@ pub(crate) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
         return Err(ViewError::Absent("no other definitions were named; `mirrorstats view --against` does".to_owned()));
     };
     let scored = snapshot.table()?;
-    if !scored.study.parts().is_empty() {
+    if !scored.study.question.parts.is_empty() {
         let words = "the experiments have different definitions; `mirrorstats diff` holds one against another";
         return Err(ViewError::Absent(words.to_owned()));
     }
-    let own = scored.study.definitions_name();
+    let own = scored.study.question.definitions_name();
     let request = DiffRequest {
         metrics: options.question.metrics.clone(),
         filter: options.question.filter.clone(),

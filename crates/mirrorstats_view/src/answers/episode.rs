@@ -18,9 +18,9 @@ use mirrorstats_study::question::Question;
 use mirrorstats_trace::episodes::episode::Episode;
 use mirrorstats_trace::episodes::moments::moments;
 use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::read::episode_rows::Displayed;
 use mirrorstats_trace::schema::domain::is_identity;
 use mirrorstats_trace::schema::{COLUMNS, Column, Kind, Stored, Value as Cell};
-use mirrorstats_trace::write::merge::Displayed;
 
 /// The maximum number of characters of a text in an answer; the page requests the whole text separately.
 pub(crate) const LONGEST: usize = 4_000;
@@ -71,6 +71,7 @@ pub(crate) fn described(
         "labels": labels::of_episode(snapshot, &episode.episode_id),
         "lost": is_lost(snapshot, &episode.episode_id),
         "constants": constants(opened, longest),
+        "view": snapshot.recording(opened).map(|mut recording| recording["view"].take()),
         "own": opened.own.is_some(),
         "steps": steps(opened, longest),
         "verdict": verdict::answer(opened),

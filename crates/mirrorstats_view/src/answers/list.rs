@@ -152,7 +152,7 @@ fn sorted(snapshot: &Snapshot, query: &Query) -> Result<Vec<usize>, ViewError> {
 
 fn entry(table: &EpisodeTable, row: usize) -> Value {
     let key = table.keys.get(row);
-    let value = |metric: &MetricColumn| metric.get(row).map(|value| value.to_string());
+    let value = |metric: &MetricColumn| table.decimal(metric, row).map(|value| value.to_string());
     json!({
         "id": key.episode_id,
         "name": visible(key.episode_id),

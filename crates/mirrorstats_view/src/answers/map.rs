@@ -17,9 +17,9 @@ const MOST: usize = 12_000;
 
 pub(crate) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let opened = snapshot.episode(required(query, "id")?)?;
-    // The episode's page reports an unreadable log.
+    // The episode's page reports an unreadable log, and its frame a failed replay.
     let mut map = Map::default();
-    Ok(match snapshot.logs.each_shapes(&opened, &mut |t, shapes| map.add(t, &shapes)) {
+    Ok(match snapshot.each_shapes(&opened, &mut |t, shapes| map.add(t, shapes)) {
         Ok(()) => map.into_json(opened.episode.steps.len()),
         Err(_) => Map::default().into_json(0),
     })

@@ -16,7 +16,7 @@ use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
 use mirrorstats_study::overview::{Overview, Part, overview};
 use mirrorstats_study::question::Question;
 use mirrorstats_study::results::{ModelMean, Outputs, model_means};
-use mirrorstats_trace::episodes::palette::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 pub(crate) fn study(snapshot: &Snapshot) -> Value {
     let Some(scored) = &snapshot.scored else {
@@ -140,7 +140,7 @@ fn scanned(snapshot: &Snapshot, scored: &Scored, filter: &Filter, part: Part) ->
     let question = Question { filter: condition, ..options.question.clone() };
     let study = Scored::study(options, scored.inputs.clone(), question)?;
     let figures = if part == Part::Figures { mirrorstats_figures::FigureName::ALL.as_slice() } else { &[] };
-    let outputs = Outputs { losses: true, copy_candidates: true, ..Outputs::of_figures(figures) };
+    let outputs = Outputs { copy_candidates: true, ..Outputs::of_figures(figures) };
     Ok(overview(&study, study.scan(outputs)?, &options.style, part)?)
 }
 

@@ -59,7 +59,6 @@ impl ConcurrencyLimiter {
         turn
     }
 
-    /// Takes the time of the next request.
     fn due(&self) -> Instant {
         let mut state = locked(&self.state);
         let due = state.next.max(state.not_before).max(Instant::now());

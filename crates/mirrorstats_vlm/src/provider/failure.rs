@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use reqwest::StatusCode;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::parameter;
-use crate::wire_format::error_of;
+use crate::wire_format::{WireFormat, error_of};
 use mirrorstats_agents::Status;
 
 const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
@@ -15,12 +15,13 @@ const SEES: &str = "\n  help: choose a model that sees; a server of one's own ma
 const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
                         answered is not asked again";
 
+const ADDRESS: &str = "\n  help: check `--base-url` and the backend's `wire_format`, and that nothing asks for a stream; the request may have \
+                       been paid";
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     pub kind: FailureKind,
-    /// The failure, without any key.
     pub detail: String,
-    /// The wait that the provider requests.
     pub after: Option<Duration>,
     /// The provider may have made an answer, and may bill it.
     pub may_be_paid: bool,
@@ -39,6 +40,8 @@ pub enum FailureKind {
     Rejected,
     /// The provider takes no request with this key, from this account, or for this model.
     Denied,
+    /// The answer has a shape that a repeated request would not change, such as a page or a stream.
+    OtherShape,
     /// The model or its server takes no images, but every request has one.
     NoImages,
 }
@@ -47,13 +50,16 @@ impl FailureKind {
     pub const fn status(self) -> Status {
         match self {
             Self::RateLimited | Self::DailyQuota => Status::RateLimited,
-            Self::Overloaded | Self::Server | Self::Rejected | Self::Denied | Self::NoImages => Status::ServerError,
             Self::Timeout => Status::Timeout,
+            _ => Status::ServerError,
         }
     }
 
-    pub(crate) const fn may_pass(self) -> bool {
-        self.is_busy() || matches!(self, Self::Server | Self::Timeout)
+    /// Returns true if a repeated request may succeed. Once the model has answered, another shape is a gateway's outage.
+    pub(crate) const fn may_pass(self, has_answered: bool) -> bool {
+        self.is_busy()
+            || matches!(self, Self::Server | Self::Timeout)
+            || has_answered && matches!(self, Self::OtherShape)
     }
 
     /// Returns true if the provider only postpones the request.
@@ -67,8 +73,9 @@ impl Failure {
         let Self { kind, detail, .. } = self;
         match kind {
             FailureKind::NoImages => format!("the model, or the server that runs it, takes no images: {detail}{SEES}"),
+            FailureKind::OtherShape => format!("{detail}{ADDRESS}"),
             FailureKind::DailyQuota => format!("the provider's quota of the day is used up: {detail}{TOMORROW}"),
-            kind if kind.may_pass() => format!("the provider gave no answer: {}: {detail}", kind.status().name()),
+            kind if kind.may_pass(false) => format!("the provider gave no answer: {}: {detail}", kind.status().name()),
             _ => format!("the provider refuses the request: {detail}{}", parameter::help(detail, model)),
         }
     }
@@ -128,12 +135,29 @@ pub(crate) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
     Failure { kind, detail, after, may_be_paid: kind == FailureKind::Timeout }
 }
 
-pub(crate) fn no_answer(body: &str) -> Failure {
-    let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
-    let detail = format!("the answer is not of the provider's language: {}", shortened(body));
+/// The failure of a body with status 200 that is no answer; `fault` says why.
+pub(crate) fn no_answer(wire_format: WireFormat, body: &str, fault: &str) -> Failure {
+    let (kind, found) = match other_shape(body) {
+        _ if takes_no_images(body) => (FailureKind::NoImages, fault),
+        Some(shape) => (FailureKind::OtherShape, shape),
+        None => (FailureKind::Server, fault),
+    };
+    let detail =
+        format!("expected an answer of the wire format {}, found {found}: {}", json!(wire_format), shortened(body));
     // Routers report with status 200 that no model answered.
     let is_error = serde_json::from_str::<Value>(body).is_ok_and(|body| error_of(&body).is_some());
     Failure { kind, detail, after: None, may_be_paid: !is_error }
+}
+
+/// The shape of a body that a repeated request would not change; `None` if it is unknown.
+fn other_shape(body: &str) -> Option<&'static str> {
+    let text = body.trim_start_matches('\u{feff}').trim_start();
+    match serde_json::from_str::<Value>(text) {
+        Ok(body) => body["output"].is_array().then_some("an answer of OpenAI's Responses"),
+        Err(_) if text.starts_with('<') => Some("a page of HTML or XML"),
+        Err(_) if text.starts_with("data:") || text.starts_with("event:") => Some("a stream of events"),
+        Err(_) => None,
+    }
 }
 
 /// Phrases by which servers reject images, lower case.
@@ -193,7 +217,12 @@ fn is_of_a_day(body: &str) -> bool {
 mod tests {
     use reqwest::StatusCode;
 
-    use super::{FailureKind, failed, no_answer};
+    use super::{FailureKind, failed, other_shape};
+    use crate::wire_format::WireFormat;
+
+    fn no_answer(body: &str) -> super::Failure {
+        super::no_answer(WireFormat::OpenaiChat, body, "other JSON")
+    }
 
     #[test]
     fn an_exhausted_quota_is_not_a_rate_limit() {
@@ -235,6 +264,22 @@ mod tests {
         let other = r#"{"error":{"message":"the image of this request cannot be decoded"}}"#;
         assert_eq!(kind(StatusCode::INTERNAL_SERVER_ERROR, other), FailureKind::Server);
         assert_eq!(kind(StatusCode::BAD_REQUEST, other), FailureKind::Rejected);
-        assert!(!FailureKind::NoImages.may_pass());
+        assert!(!FailureKind::NoImages.may_pass(true));
+    }
+
+    #[test]
+    fn other_shapes_are_named() {
+        for (body, expected) in [
+            ("data: {\"choices\": []}\n\ndata: [DONE]\n\n", Some("a stream of events")),
+            ("event: message_start\ndata: {}\n\n", Some("a stream of events")),
+            ("<!doctype html><html></html>", Some("a page of HTML or XML")),
+            (r#"{"object": "response", "output": []}"#, Some("an answer of OpenAI's Responses")),
+            (r#"{"choices": null}"#, None),
+            (r#"{"error": {"code": 502}}"#, None),
+            ("half an ans", None),
+            ("", None),
+        ] {
+            assert_eq!(other_shape(body), expected, "{body}");
+        }
     }
 }

@@ -8,13 +8,12 @@ pub mod concurrency;
 pub mod failure;
 mod parameter;
 mod preflight;
-pub mod rate_limit;
+mod rate_limit;
 mod waiting;
 
 use std::net::IpAddr;
 use std::time::{Duration, Instant};
 
-pub(super) use parameter::{Mend, refused};
 use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
@@ -27,7 +26,7 @@ use failure::{Failure, broken, failed, no_answer, server};
 use mirrorstats_agents::secrets::Secret;
 pub use preflight::Unreachable;
 use preflight::connect;
-use rate_limit::{RateLimit, retry_after, retry_info, stated, used_up};
+use rate_limit::{retry_after, retry_info, used_up};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Patience {
@@ -72,7 +71,6 @@ pub struct Received {
     pub body: String,
     /// From sending the request to the end of the answer.
     pub latency: Duration,
-    pub rate_limits: Vec<RateLimit>,
 }
 
 #[derive(Debug)]
@@ -175,7 +173,6 @@ impl Provider {
         self.limiter.turn().await
     }
 
-    /// Sends a request once, in its turn.
     pub async fn ask(&self, turn: Permit<'_>, body: &Value) -> Result<Received, Failure> {
         let result = self.exchange(body).await;
         drop(turn);
@@ -202,7 +199,7 @@ impl Provider {
         let start = Instant::now();
         let response = self.client.post(self.url.clone()).json(body).send().await.map_err(broken)?;
         let (status, after) = (response.status(), retry_after(response.headers()));
-        let (renewed, rate_limits) = (used_up(response.headers()), stated(response.headers()));
+        let renewed = used_up(response.headers());
         self.pause(renewed);
         let kind =
             response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or("none").to_owned();
@@ -221,11 +218,11 @@ impl Provider {
         let latency = start.elapsed();
         // A billed answer counts regardless of its content type, or without one.
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
-        let answer = self.wire_format.read(&text).map_err(|fault| {
-            server(format!("expected an answer in JSON, found the content type {kind} and: {fault}"))
-        })?;
-        let answer = answer.ok_or_else(|| no_answer(&self.without_secret(&text)))?;
-        Ok(Received { rate_limits, ..received(self.secret.as_ref(), answer, text, latency) })
+        let no_answer = |fault: &str| no_answer(self.wire_format, &self.without_secret(&text), fault);
+        let answer = self.wire_format.read(&text);
+        let answer = answer.map_err(|fault| no_answer(&format!("the content type {kind} and no JSON ({fault})")))?;
+        let answer = answer.ok_or_else(|| no_answer("other JSON"))?;
+        Ok(received(self.secret.as_ref(), answer, text, latency))
     }
 
     /// The answer in an error about the content. Providers send it as a bad request, routers also as a
@@ -246,7 +243,7 @@ fn received(secret: Option<&Secret>, answer: ModelAnswer, body: String, latency:
         None => text,
     };
     let answer = ModelAnswer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
-    Received { answer, body: kept(body), latency, rate_limits: Vec::new() }
+    Received { answer, body: kept(body), latency }
 }
 
 async fn whole(mut response: Response, most: usize) -> Result<Vec<u8>, Failure> {
@@ -285,16 +282,13 @@ fn headers(wire_format: WireFormat, secret: Option<&Secret>) -> Result<HeaderMap
     }
     if let Some(secret) = secret {
         let (name, prefix) = wire_format.key_header();
-        headers.insert(HeaderName::from_static(name), key_header(prefix, secret).ok_or(SetupError::Key)?);
+        let value = HeaderValue::from_str(&format!("{prefix}{}", secret.for_header()));
+        let mut value = value.map_err(|_| SetupError::Key)?;
+        // No client prints a header that is marked so.
+        value.set_sensitive(true);
+        headers.insert(HeaderName::from_static(name), value);
     }
     Ok(headers)
-}
-
-/// The header value with the key, marked so that no client prints it.
-fn key_header(prefix: &str, secret: &Secret) -> Option<HeaderValue> {
-    let mut value = HeaderValue::from_str(&format!("{prefix}{}", secret.for_header())).ok()?;
-    value.set_sensitive(true);
-    Some(value)
 }
 
 #[cfg(test)]

@@ -31,7 +31,6 @@ pub(super) fn connect(url: &Url, patience: Duration) -> Result<(), Unreachable> 
     first_of(&addresses, patience).map_err(unreachable)
 }
 
-/// A connection to the first of these addresses that accepts one.
 fn first_of(addresses: &[SocketAddr], patience: Duration) -> io::Result<()> {
     let each = patience / u32::try_from(addresses.len().max(1)).unwrap_or(u32::MAX);
     let mut fault = io::Error::other("its name has no address");

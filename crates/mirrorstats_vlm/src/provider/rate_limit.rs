@@ -4,8 +4,6 @@ use std::time::{Duration, SystemTime};
 
 use arrow::compute::kernels::cast_utils::string_to_timestamp_nanos;
 use reqwest::header::{HeaderMap, RETRY_AFTER};
-use schemars::JsonSchema;
-use serde::Serialize;
 use serde_json::Value;
 
 use crate::wire_format::error_of;
@@ -16,37 +14,16 @@ const HEADERS: [fn(&str, &str) -> String; 2] = [
     |counts, what| format!("anthropic-ratelimit-{counts}-{what}"),
 ];
 
-/// A rate limit of the account, as the headers of an answer have it.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct RateLimit {
-    /// The counted unit: `requests` or `tokens`.
-    pub counts: String,
-    /// The remaining amount.
-    pub remaining: f64,
-    /// The limit; null if the provider does not say it.
-    pub limit: Option<f64>,
-    /// The time of renewal, as the provider says it: a time such as `6m0s`, or a date; null if it does not.
-    pub renewed: Option<String>,
-}
-
-pub(super) fn stated(headers: &HeaderMap) -> Vec<RateLimit> {
-    let limit = |header: fn(&str, &str) -> String, counts: &str| {
-        let text = |what: &str| headers.get(header(counts, what))?.to_str().ok().map(str::trim);
-        let number = |what: &str| text(what).and_then(decimal);
-        let (remaining, renewed) = (number("remaining")?, text("reset").map(str::to_owned));
-        Some(RateLimit { counts: counts.to_owned(), remaining, limit: number("limit"), renewed })
-    };
-    HEADERS
-        .into_iter()
-        .flat_map(|header| ["requests", "tokens"].map(|counts| limit(header, counts)))
-        .flatten()
-        .collect()
-}
-
 /// The time until all used-up limits are renewed; `None` if no limit is used up.
 pub(super) fn used_up(headers: &HeaderMap) -> Option<Duration> {
-    let used_up = stated(headers).into_iter().filter(|limit| limit.remaining <= 0.0);
-    used_up.filter_map(|limit| until(limit.renewed.as_deref()?)).max()
+    let until_renewed = |header: fn(&str, &str) -> String, counts: &str| {
+        let text = |what: &str| headers.get(header(counts, what))?.to_str().ok().map(str::trim);
+        let is_used_up = text("remaining").and_then(decimal).is_some_and(|remaining| remaining <= 0.0);
+        until(text("reset").filter(|_| is_used_up)?)
+    };
+    let of_units =
+        HEADERS.into_iter().flat_map(|header| ["requests", "tokens"].map(|counts| until_renewed(header, counts)));
+    of_units.flatten().max()
 }
 
 /// The time until a limit is renewed: `6m0s`, `20ms`, or an RFC 3339 date.
@@ -114,7 +91,7 @@ mod tests {
 
     use reqwest::header::{HeaderMap, HeaderName, HeaderValue, RETRY_AFTER};
 
-    use super::{RateLimit, retry_after, stated, until, used_up};
+    use super::{retry_after, until, used_up};
 
     #[test]
     fn a_valid_retry_after_is_read_and_an_invalid_one_ignored() {
@@ -146,10 +123,6 @@ mod tests {
             ("x-ratelimit-reset-tokens", "6h"),
         ];
         assert_eq!(used_up(&headers(&tokens_left)), Some(Duration::from_millis(60_500)));
-        let tokens = stated(&headers(&[&tokens_left[..], &[("x-ratelimit-limit-tokens", "150000")]].concat())).pop();
-        let renewed = Some("6h".to_owned());
-        let limit = RateLimit { counts: "tokens".into(), remaining: 149_984.0, limit: Some(150_000.0), renewed };
-        assert_eq!(tokens, Some(limit));
         let anthropic = [
             ("anthropic-ratelimit-tokens-remaining", "0"),
             ("anthropic-ratelimit-tokens-reset", "2199-01-01T00:00:00Z"),

@@ -29,7 +29,6 @@ impl Waiting {
         Self { patience, failed: 0, after_failures, waited: Duration::ZERO, while_busy }
     }
 
-    /// The wait before the next attempt; `None` if there is none.
     pub(crate) fn next(&mut self, failure: &Failure) -> Option<Duration> {
         if failure.kind.is_busy() { self.busy(failure.after) } else { self.failed(failure.after) }
     }

@@ -3,28 +3,34 @@
 use serde_json::{Value, json};
 
 use super::refusal::ending;
-use super::{ModelAnswer, Question, text, text_or_call, tokens};
+use super::{Effort, ModelAnswer, Question, text, text_or_call, tokens};
 use mirrorstats_agents::reply::Ending;
 
-pub(super) fn body(question: &Question<'_>) -> Value {
-    let source = json!({ "type": "base64", "media_type": "image/png", "data": question.png_base64 });
+pub(super) fn body(&Question { model, temperature, words, png, schema }: &Question<'_>) -> Value {
+    let source = json!({ "type": "base64", "media_type": "image/png", "data": png });
     let mut body = json!({
-        "model": question.model,
-        "max_tokens": question.max_output_tokens,
-        "system": question.system,
+        "model": model.id,
+        "max_tokens": model.max_output_tokens(),
+        "system": words.system,
         "messages": [{ "role": "user", "content": [
+            { "type": "text", "text": words.user },
             { "type": "image", "source": source },
-            { "type": "text", "text": question.user },
         ] }],
     });
-    if let Some(temperature) = question.temperature {
+    if let Some(temperature) = temperature {
         body["temperature"] = json!(temperature);
     }
-    if let Some(schema) = question.schema {
+    if let Some(schema) = schema {
         body["output_config"] = json!({ "format": { "type": "json_schema", "schema": schema } });
     }
-    if let Some(effort) = question.reasoning_effort {
-        body["output_config"]["effort"] = json!(effort.name());
+    match model.reasoning_effort {
+        None => {}
+        Some(Effort::None) => body["thinking"] = json!({ "type": "disabled" }),
+        // Up to 4.6 a model thinks only on request; for later ones this is the default.
+        Some(effort) => {
+            body["thinking"] = json!({ "type": "adaptive" });
+            body["output_config"]["effort"] = json!(effort.name());
+        }
     }
     body
 }
@@ -51,7 +57,7 @@ pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
         }),
         cached_tokens: tokens(&usage["cache_read_input_tokens"]),
         completion_tokens: tokens(&usage["output_tokens"]),
-        cost_usd: None,
         model: text(&body["model"]),
+        ..ModelAnswer::default()
     })
 }

@@ -6,24 +6,24 @@ use super::refusal::ending;
 use super::{Effort, ModelAnswer, Question, text, text_or_call, tokens};
 use mirrorstats_agents::reply::{Ending, Repair};
 
-pub(super) fn body(question: &Question<'_>) -> Value {
+pub(super) fn body(&Question { model, temperature, words, png, schema }: &Question<'_>) -> Value {
     let mut body = json!({
         "contents": [{ "role": "user", "parts": [
-            { "inlineData": { "data": question.png_base64, "mimeType": "image/png" } },
-            { "text": question.user },
+            { "text": words.user },
+            { "inlineData": { "data": png, "mimeType": "image/png" } },
         ] }],
-        "systemInstruction": { "parts": [{ "text": question.system }], "role": "user" },
-        "generationConfig": { "maxOutputTokens": question.max_output_tokens },
+        "systemInstruction": { "parts": [{ "text": words.system }], "role": "user" },
+        "generationConfig": { "maxOutputTokens": model.max_output_tokens() },
     });
-    if let Some(temperature) = question.temperature {
+    if let Some(temperature) = temperature {
         body["generationConfig"]["temperature"] = json!(temperature);
     }
-    if let Some(schema) = question.schema {
+    if let Some(schema) = schema {
         body["generationConfig"]["responseMimeType"] = json!("application/json");
         body["generationConfig"]["responseJsonSchema"] = schema.clone();
     }
-    if let Some(effort) = question.reasoning_effort {
-        body["generationConfig"]["thinkingConfig"] = thinking(question.model, effort);
+    if let Some(effort) = model.reasoning_effort {
+        body["generationConfig"]["thinkingConfig"] = thinking(&model.id, effort);
     }
     body
 }
@@ -69,12 +69,11 @@ pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
             [None, None] => None,
             [candidates, thoughts] => Some(candidates.unwrap_or(0).saturating_add(thoughts.unwrap_or(0))),
         },
-        cost_usd: None,
         model: text(&body["modelVersion"]),
+        ..ModelAnswer::default()
     })
 }
 
-/// The text of a candidate without its thoughts, or the arguments of its function call.
 fn words(candidate: &Value) -> (String, Vec<Repair>) {
     let parts = candidate["content"]["parts"].as_array().map(Vec::as_slice).unwrap_or_default();
     let is_thought = |part: &&Value| part["thought"] == true || part["thought"] == "true";

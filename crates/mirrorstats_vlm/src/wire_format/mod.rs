@@ -1,8 +1,8 @@
 //! The wire formats of providers: requests as JSON, and the content of answers.
 //!
 //! Rule: pure. A wire format knows the shape of bodies and the names of headers; it sends nothing and holds no key. Bodies
-//! contain exactly what the provider's own client library sends for the same call. The frame always precedes the words
-//! of the user prompt: the paper's prompt names it first, and Anthropic and Google advise it.
+//! contain exactly what the provider's own client library sends for the same call. The frame follows the words of the
+//! user prompt, in the order in which the paper lists the inputs of a step.
 
 mod anthropic;
 mod gemini;
@@ -13,6 +13,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::models::Model;
+use mirrorstats_agents::prompt::Rendered;
 use mirrorstats_agents::reply::{Ending, Repair, has_object, without_lone_surrogates};
 use mirrorstats_exact::names;
 
@@ -31,21 +33,15 @@ pub enum WireFormat {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Question<'a> {
-    /// The provider's id of the model.
-    pub model: &'a str,
-    pub system: &'a str,
-    pub user: &'a str,
+pub(crate) struct Question<'a> {
+    pub model: &'a Model,
+    /// The temperature to send, if any.
+    pub temperature: Option<f64>,
+    pub words: &'a Rendered,
     /// The frame as PNG in base64.
-    pub(crate) png_base64: &'a str,
+    pub png: &'a str,
     /// The JSON Schema for the provider to enforce; `None` if only the prompt describes it.
     pub schema: Option<&'a Value>,
-    /// The sampling temperature (0.2 in the paper); `None` leaves it to the provider.
-    pub temperature: Option<f64>,
-    /// The maximum tokens of a reply, including hidden reasoning.
-    pub max_output_tokens: u32,
-    /// The requested reasoning effort; `None` leaves it to the provider.
-    pub reasoning_effort: Option<Effort>,
 }
 
 /// The effort of a model's reasoning before it replies. Not every model takes every effort.
@@ -82,8 +78,10 @@ names!(Effort {
 pub struct ModelAnswer {
     /// The text of the reply; empty if there is none.
     pub text: String,
-    /// Repairs of the text's container: a lone surrogate in the body, for which the text has U+FFFD; a function call,
-    /// whose arguments are the text.
+    /// True if the only text is the model's reasoning.
+    pub is_reasoning_alone: bool,
+    /// Repairs of the text's container: a lone surrogate in the body, for which the text has U+FFFD; a function call or
+    /// an object in place of a text, whose JSON is the text.
     pub repairs: Vec<Repair>,
     pub ending: Ending,
     /// Tokens of the request, including cached ones, if counted.
@@ -133,7 +131,7 @@ impl WireFormat {
         }
     }
 
-    pub fn body(self, question: &Question<'_>) -> Value {
+    pub(crate) fn body(self, question: &Question<'_>) -> Value {
         match self {
             Self::OpenaiChat => openai::body(question, "max_completion_tokens"),
             Self::OpenaiCompatible => openai::body(question, "max_tokens"),
@@ -173,8 +171,20 @@ impl WireFormat {
             Self::Gemini => gemini::answer(body),
             Self::AnthropicMessages => anthropic::answer(body),
         };
-        answer.or_else(|| refusal::answer(body))
+        let answer = answer.or_else(|| refusal::answer(body));
+        answer.map(|answer| ModelAnswer { is_reasoning_alone: answer.text.is_empty() && has_reasoning(body), ..answer })
     }
+}
+
+/// Returns true if a body of any wire format has reasoning.
+fn has_reasoning(body: &Value) -> bool {
+    let message = &body["choices"][0]["message"];
+    let parts = [&message["content"], &body["content"], &body["candidates"][0]["content"]["parts"]];
+    let is_kind = |kind: &str| kind.contains("thinking") || kind.starts_with("reasoning");
+    let is_thought = |part: &Value| part.get("thought").is_some() || part["type"].as_str().is_some_and(is_kind);
+    let has_text = |key| message[key].as_str().is_some_and(|text| !text.trim().is_empty());
+    ["reasoning_content", "reasoning"].into_iter().any(has_text)
+        || parts.into_iter().filter_map(Value::as_array).flatten().any(is_thought)
 }
 
 /// The error in a body; some providers put it into a list.

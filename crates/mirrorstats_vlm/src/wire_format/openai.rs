@@ -6,26 +6,26 @@ use super::refusal::ending;
 use super::{ModelAnswer, Question, text, text_or_call, tokens};
 use mirrorstats_agents::reply::Ending;
 
-pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
-    let image = format!("data:image/png;base64,{}", question.png_base64);
+pub(super) fn body(&Question { model, temperature, words, png, schema }: &Question<'_>, limit: &str) -> Value {
+    let image = format!("data:image/png;base64,{png}");
     let mut body = json!({
-        "model": question.model,
+        "model": model.id,
         "messages": [
-            { "role": "system", "content": question.system },
+            { "role": "system", "content": words.system },
             { "role": "user", "content": [
+                { "type": "text", "text": words.user },
                 { "type": "image_url", "image_url": { "url": image } },
-                { "type": "text", "text": question.user },
             ] },
         ],
     });
-    if let Some(temperature) = question.temperature {
+    if let Some(temperature) = temperature {
         body["temperature"] = json!(temperature);
     }
-    body[limit] = json!(question.max_output_tokens);
-    if let Some(effort) = question.reasoning_effort {
+    body[limit] = json!(model.max_output_tokens());
+    if let Some(effort) = model.reasoning_effort {
         body["reasoning_effort"] = json!(effort.name());
     }
-    if let Some(schema) = question.schema {
+    if let Some(schema) = schema {
         body["response_format"] = json!({
             "type": "json_schema",
             "json_schema": { "name": "reply", "strict": true, "schema": schema },
@@ -53,6 +53,7 @@ pub(super) fn answer(body: &Value) -> Option<ModelAnswer> {
         completion_tokens: tokens(&usage["completion_tokens"]),
         cost_usd: usage["cost"].as_f64().filter(|cost| *cost >= 0.0),
         model: text(&body["model"]),
+        ..ModelAnswer::default()
     })
 }
 
@@ -63,11 +64,14 @@ fn reply(choice: &Value) -> (String, Ending) {
     (content(&message["content"]).or_else(|| refusal.map(str::to_owned)).unwrap_or_default(), ending)
 }
 
-/// The arguments of calls of functions; `function_call` is the older form of a single one.
+/// The arguments of calls of functions; `function_call` is the older form of a single one. Or an object in place of a text.
 fn arguments(choice: &Value) -> Vec<&Value> {
     let message = &choice["message"];
     match message["tool_calls"].as_array().map(Vec::as_slice) {
-        None | Some([]) => vec![&message["function_call"]["arguments"]],
+        None | Some([]) => {
+            let object = message.get("content").filter(|content| content.is_object() && content.get("text").is_none());
+            vec![&message["function_call"]["arguments"], object.unwrap_or(&message["parsed"])]
+        }
         Some(calls) => calls.iter().map(|call| &call["function"]["arguments"]).collect(),
     }
 }
@@ -80,6 +84,6 @@ fn content(content: &Value) -> Option<String> {
             let is_text = |part: &&Value| matches!(part["type"].as_str(), None | Some("text" | "output_text"));
             Some(parts.iter().filter(is_text).filter_map(|part| part["text"].as_str()).collect())
         }
-        _ => None,
+        part => part["text"].as_str().map(str::to_owned),
     }
 }

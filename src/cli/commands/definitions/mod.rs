@@ -12,7 +12,6 @@ use serde::Serialize;
 
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_exact::suggest::nearest;
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_metric::file::{FileError, built_in, built_in_names};
 use mirrorstats_score::vocabulary;
@@ -129,14 +128,13 @@ fn explain(metric: &str, definitions: &Path, json: bool) -> Result<Outcome, Fail
         return output::print(&explanation, json);
     }
     let known: Vec<String> = definitions.catalog.metric.keys().cloned().collect();
-    let near = nearest(metric, known.iter().map(String::as_str)).map(str::to_owned);
-    Err(Failure::input(UnknownMetric { name: metric.to_owned(), near, known }))
+    Err(Failure::input(UnknownMetric::new(metric, &known)))
 }
 
 fn show(name: &str) -> Result<Outcome, Failure> {
     let Some(text) = built_in(name) else {
         let names = built_in_names().join(", ");
-        return Err(Failure::Rendered(format!("error: no built-in definitions `{name}`; there are {names}")));
+        return Err(Failure::input(format!("no built-in definitions `{name}`; there are {names}")));
     };
     output::plain(text)
 }

@@ -7,7 +7,7 @@ use crate::cli::args::number;
 #[cfg(feature = "sim")]
 use crate::cli::commands::world::configured;
 #[cfg(feature = "sim")]
-use crate::cli::registration;
+use crate::cli::registered;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::plan::register::{NamedHash, RegisteredPlan};
 use mirrorstats_analysis::plan::{Given, Plan, PlanRequest, plan};
@@ -151,9 +151,7 @@ impl PlanArgs {
 
     #[cfg(feature = "sim")]
     fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
-        let config = configured(self.config.as_ref())?;
-        let world = NamedHash { name: registration::WORLD.to_owned(), sha256: config.hash() };
-        Ok((vec![world], registration::prompts()))
+        Ok(registered::recorded(&configured(self.config.as_ref())?))
     }
 
     #[cfg(not(feature = "sim"))]

@@ -54,7 +54,9 @@ mod rows {
     use super::{Failure, Outcome, QueryArgs};
 
     pub fn answer(_: &QueryArgs) -> Result<Outcome, Failure> {
-        Err(mirrorstats_study::StudyError::WithoutPolars.into())
+        let words = "`query` needs Polars, which this build lacks\n  \
+                     help: build with it: cargo build --release --features polars";
+        Err(Failure::input(words))
     }
 }
 
@@ -114,11 +116,9 @@ mod rows {
 
     /// The failure of an engine, with another one that may do better.
     fn failed(error: StudyError, elsewhere: impl FnOnce() -> String) -> Failure {
-        match error {
-            StudyError::Polars(error @ PolarsError::Failed(_)) => {
-                Failure::Rendered(format!("error: {error}\n  help: {}", elsewhere()))
-            }
-            other => other.into(),
+        match error.cause() {
+            Some(PolarsError::Failed(_)) => Failure::input(format!("{error}\n  help: {}", elsewhere())),
+            _ => error.into(),
         }
     }
 
@@ -132,8 +132,8 @@ mod rows {
             (Some("jsonl" | "ndjson"), _) => AnswerFormat::Jsonl,
             (Some("parquet"), _) => AnswerFormat::Parquet,
             (_, Some(path)) if args.format.is_none() && !is_stream(path) => {
-                return Err(Failure::Rendered(format!(
-                    "error: `{}`: expected a name that ends in .csv, .jsonl, .parquet or .txt\n  help: or say which format with --format",
+                return Err(Failure::input(format!(
+                    "`{}`: expected a name that ends in .csv, .jsonl, .parquet or .txt\n  help: or say which format with --format",
                     path.display()
                 )));
             }
@@ -144,8 +144,8 @@ mod rows {
             AnswerFormat::Csv => Some(Format::Csv),
             AnswerFormat::Jsonl => Some(Format::JsonLines),
             AnswerFormat::Parquet if args.output.is_none() => {
-                let words = "error: Parquet is no text for standard output\n  help: name a file with -o";
-                return Err(Failure::Rendered(words.to_owned()));
+                let words = "Parquet is no text for standard output\n  help: name a file with -o";
+                return Err(Failure::input(words));
             }
             AnswerFormat::Parquet => Some(Format::Parquet),
         })

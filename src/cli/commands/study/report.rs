@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
-use crate::cli::scoring::with_plan;
+use crate::cli::registered::with_plan;
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
 use mirrorstats_report::bundle::Manifest;

@@ -16,7 +16,7 @@ use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_study::Study;
 use mirrorstats_study::explain::explain;
 use mirrorstats_study::scores;
-use mirrorstats_study::spark::{SparkJob, are_uris};
+use mirrorstats_study::spark::{SparkJob, are_uris, score_on};
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -76,9 +76,9 @@ impl EngineArgs {
         match engine {
             Engine::Spark => Ok(Some(Cluster { master, settings, timeout_s, log })),
             Engine::Native if !is_typed => Ok(None),
-            Engine::Native => Err(Failure::Rendered(
-                "error: --master and --spark-... are words for Spark\n  help: add --engine spark".to_owned(),
-            )),
+            Engine::Native => {
+                Err(Failure::input("--master and --spark-... are words for Spark\n  help: add --engine spark"))
+            }
         }
     }
 }
@@ -103,16 +103,15 @@ impl ScoreArgs {
 
     fn run_on(&self, cluster: Cluster) -> Result<Outcome, Failure> {
         if self.explain.is_some() {
-            let words =
-                "error: --explain looks into the steps, which Spark keeps to itself\n  help: leave --engine out";
-            return Err(Failure::Rendered(words.to_owned()));
+            let words = "--explain looks into the steps, which Spark keeps to itself\n  help: leave --engine out";
+            return Err(Failure::input(words));
         }
         let folder = self.output.as_deref().filter(|output| is_folder(output));
         let format = if folder.is_none() { self.format()? } else { Format::Parquet };
         if folder.is_none() && !are_uris(&self.traces.traces)? {
             let study = self.study()?;
             self.check_target(study.files_read(None))?;
-            self.deliver(&study.score_on(cluster)?, format)?;
+            self.deliver(&score_on(&study, cluster)?, format)?;
             return Ok(Outcome::Done);
         }
         let job = self.job(cluster)?;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs, number};
-use crate::cli::scoring::with_plan;
+use crate::cli::registered::with_plan;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::statistics::text::Length;
 use mirrorstats_analysis::statistics::{Options, Sequential, Statistics};

@@ -2,7 +2,6 @@
 
 use std::ffi::OsString;
 use std::io::{self, IsTerminal as _, Write as _};
-use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -14,7 +13,7 @@ use mirrorstats_study::question::Question;
 use mirrorstats_trace::beside::label_line::check_coder;
 use mirrorstats_trace::inputs;
 use mirrorstats_view::{Options, View, export, routes};
-use mirrorstats_web::{Guard, check_token, new_token};
+use mirrorstats_web::{cannot_listen, check_token, listen, new_token};
 
 /// Show recordings in the browser: the report, each episode step by step, two episodes side by side
 ///
@@ -119,16 +118,14 @@ impl ViewArgs {
     }
 
     fn serve(&self, view: View) -> Result<Outcome, Failure> {
-        let host = self.host.as_deref().unwrap_or("127.0.0.1");
+        let (host, port) = (self.host.as_deref(), self.port);
         let taken = |error: io::Error| {
             let help = "is another `mirrorstats view` there? `--port 0` takes any port that is free";
-            Failure::Rendered(format!("error: cannot listen on {host}:{}: {error}\n  help: {help}", self.port))
+            Failure::input(format!("{}\n  help: {help}", cannot_listen(host, port, &error)))
         };
-        let listener = TcpListener::bind((host, self.port)).map_err(taken)?;
-        let address = listener.local_addr().map_err(taken)?;
         let drawn = (self.token.is_none() && !self.no_token).then(new_token).transpose();
         let drawn = drawn.map_err(|error| Failure::input(format!("cannot make a token: {error}")))?;
-        let guard = Guard::new(address, self.host.as_deref(), self.token.as_deref().or(drawn.as_deref()));
+        let (listener, guard) = listen(host, port, self.token.as_deref().or(drawn.as_deref())).map_err(taken)?;
         let link = self
             .episode
             .as_deref()
@@ -136,7 +133,7 @@ impl ViewArgs {
         writeln!(io::stdout(), "{link}")?;
         io::stdout().flush()?;
         output::say(&format!("{} episodes; Ctrl-C ends it", view.episodes()));
-        if !address.ip().is_loopback() {
+        if !guard.is_local() {
             output::say(
                 "note: the connection is not encrypted; anyone on the network can read it. Use a tunnel: `ssh -L`",
             );

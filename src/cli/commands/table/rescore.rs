@@ -168,7 +168,8 @@ fn write_reparsed(out: &mut impl io::Write, answer: &ReparseAnswer, most: usize)
         Table { names: 2, ..Table::of_texts(["episode", "t", "column", "before", "after"]).aligned_right([1]) };
     let name = |value: &Option<String>| visible(value.as_deref().unwrap_or("--"));
     for change in answer.changes.iter().take(most) {
-        let (before, after) = (name(&change.before), name(&change.after));
+        let label = change.coder.as_ref().map_or_else(String::new, |coder| format!(" (label by {})", visible(coder)));
+        let (before, after) = (name(&change.before), name(&change.after) + &label);
         table.push([visible(&change.episode_id), change.t.to_string(), change.column.clone(), before, after]);
     }
     if !answer.changes.is_empty() {

@@ -1,4 +1,4 @@
-//! `mirrorstats trace check`: checks the quality of replies in traces, for CI and before a report.
+//! `mirrorstats trace check`: checks the design and the quality of replies in traces, for CI and before a report.
 
 use std::io::{self, Write as _};
 
@@ -9,8 +9,11 @@ use mirrorstats_exact::format::fixed;
 use mirrorstats_report::layout;
 use mirrorstats_score::quality::{CellKey, Quality, QualityByCell};
 use mirrorstats_study::quality::{self, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
+use mirrorstats_study::statistics::design_audit;
 
-/// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
+/// Check the design and the replies of traces: exits with 1 if anything is found or cannot be checked
+///
+/// `--design` audits what the episodes can be compared for: scenes, repeats, seeds, budgets, settings, losses.
 ///
 /// Shares are of the replies of one cell: an experiment, a model and a condition. A limit cannot be checked if traces
 /// do not record its quantity for every step. Lost episodes are those ended by the infrastructure, and those in
@@ -25,6 +28,9 @@ pub struct CheckArgs {
     /// The most lost episodes, over all cells
     #[arg(long, value_name = "N")]
     pub max_lost: Option<u64>,
+    /// Audit the design of the study
+    #[arg(long)]
+    pub design: bool,
     /// Answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -32,17 +38,25 @@ pub struct CheckArgs {
 
 impl CheckArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        if self.max_unreadable.is_none() && self.max_lost.is_none() {
-            let words = "expected a limit to check, found none\n  help: name one, such as --max-unreadable 0.05";
+        if self.max_unreadable.is_none() && self.max_lost.is_none() && !self.design {
+            let words =
+                "expected a limit to check or --design, found none\n  help: name one, such as --max-unreadable 0.05";
             return Err(Failure::input(words));
         }
         let limits = QualityLimits { max_unreadable: self.max_unreadable, max_lost: self.max_lost };
-        let cells = quality::quality(&self.traces.open()?)?;
-        let answer = QualityCheckAnswer::of(&cells, limits);
+        let study = self.traces.open()?;
+        let cells = quality::quality(&study)?;
+        let design = if self.design { Some(design_audit(&study.grouped()?)?) } else { None };
+        let answer = QualityCheckAnswer::of(&cells, limits, design);
         if self.json {
             output::print_json(&answer)?;
         } else {
-            print(&answer, &cells)?;
+            if let Some(design) = &answer.design {
+                io::stdout().write_all(design.render(crate::cli::terminal::width()).as_bytes())?;
+            }
+            if self.max_unreadable.is_some() || self.max_lost.is_some() {
+                print(&answer, &cells)?;
+            }
         }
         Ok(if answer.holds { Outcome::Done } else { Outcome::CheckFailed })
     }
@@ -51,6 +65,9 @@ impl CheckArgs {
 fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
     let mut out = io::stdout().lock();
     out.write_all(layout::quality::text(cells, crate::cli::terminal::width()).as_bytes())?;
+    if let Some(unread) = layout::quality::unread_identifications(cells) {
+        writeln!(out, "{unread}")?;
+    }
     writeln!(out)?;
     let named = |cell: &CellKey| match cell.condition.as_str() {
         _ if !cells.has_conditions() => format!("{}, {}: ", visible(&cell.experiment), visible(&cell.model)),
@@ -68,7 +85,7 @@ fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
         let what = format!("not recorded for {missing} of {steps} steps, so the limit cannot be checked");
         writeln!(out, "{}--{limit}: {what}", named(cell))?;
     }
-    if answer.holds {
+    if answer.violations.is_empty() && answer.not_recorded.is_empty() {
         writeln!(out, "no limit is exceeded")?;
     }
     Ok(())

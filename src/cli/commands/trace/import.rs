@@ -3,10 +3,9 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::cli::args::one_of;
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::replace;
-use mirrorstats_import::{Format, Mapping, Text};
+use mirrorstats_import::{Format, Mapping, Notes, Text};
 use mirrorstats_study::import::{ImportRequest, import};
 
 /// Make a trace of another harness's steps or logs
@@ -20,9 +19,10 @@ pub struct ImportArgs {
     /// Files of steps, or the folder of a LeRobot data set; `-` for standard input
     #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
-    /// The format of the files [default: detected from names and first bytes]
-    #[arg(long, value_name = "FORMAT", value_parser = one_of(&Format::ALL, Format::name))]
-    from: Option<Format>,
+    /// The format of the files, or a mapping file: `jsonl`, `json`, `csv`, `parquet`, `inspect`, `inspect-robots`,
+    /// `lerobot`, `atif`, `vla-eval`, or a TOML file [default: detected from names and first bytes]
+    #[arg(long, value_name = "FORMAT|FILE.toml")]
+    from: Option<PathBuf>,
     /// The trace to write
     #[arg(short, long, value_name = "TRACE.parquet")]
     out: PathBuf,
@@ -55,9 +55,12 @@ pub struct ImportArgs {
 impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         self.check_places()?;
-        let mut mapping = Mapping::parse(&self.map, &self.set)?;
-        let texts = self.steps.iter().map(|path| text(path, self.from, &mut mapping)).collect::<Result<Vec<_>, _>>()?;
-        output::notes(&mapping.left_out());
+        let (from, file) = self.from.as_deref().map_or((None, None), format_or_file);
+        let mapping = Mapping::parse(file, &self.map, &self.set)?;
+        let mut notes = Notes::default();
+        let texts =
+            self.steps.iter().map(|path| text(path, from, &mapping, &mut notes)).collect::<Result<Vec<_>, _>>()?;
+        output::notes(&notes.texts());
         let request = ImportRequest {
             out: self.out.clone(),
             definitions: self.definitions.clone(),
@@ -70,26 +73,29 @@ impl ImportArgs {
 
     fn check_places(&self) -> Result<(), Failure> {
         if self.steps.iter().filter(|path| is_standard_input(path)).count() > 1 {
-            let words = "error: `-`: expected standard input once, found it twice\n  help: name it once";
-            return Err(Failure::Rendered(words.to_owned()));
+            let words = "`-`: expected standard input once, found it twice\n  help: name it once";
+            return Err(Failure::input(words));
         }
         replace::check_target(&self.out, &self.steps, "the steps themselves")?;
         output::check_target(&self.out, [&self.definitions].into_iter().chain(&self.palette))
     }
 }
 
-fn text(path: &Path, from: Option<Format>, mapping: &mut Mapping) -> Result<Text, Failure> {
-    if matches!(from, None | Some(Format::LeRobot))
-        && let Some(text) = Text::of_data_set(path, mapping)?
+/// The format with this name, or the file of a mapping.
+fn format_or_file(typed: &Path) -> (Option<Format>, Option<&Path>) {
+    let format = Format::ALL.into_iter().find(|format| typed.as_os_str() == format.name());
+    (format, Some(typed).filter(|_| format.is_none()))
+}
+
+fn text(path: &Path, from: Option<Format>, mapping: &Mapping, notes: &mut Notes) -> Result<Text, Failure> {
+    if matches!(from.or(mapping.format), None | Some(Format::LeRobot))
+        && let Some(text) = Text::of_data_set(path, mapping, notes)?
     {
         return Ok(text);
     }
     let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
-    let mapped = text.and_then(|mut text| {
-        let format = from.map_or_else(|| text.format(), Ok)?;
-        text.mapped(format, mapping)
-    });
-    mapped.map_err(Failure::input)
+    let read = text.and_then(|mut text| text.read(mapping, from, notes).map(|()| text));
+    read.map_err(Failure::input)
 }
 
 fn is_standard_input(path: &Path) -> bool {

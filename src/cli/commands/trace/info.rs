@@ -1,22 +1,12 @@
 //! `mirrorstats trace info`: the contents of traces.
 
-use std::fmt::Display;
-use std::io::{self, Write};
-
-use schemars::JsonSchema;
-use serde::Serialize;
+use serde_json::json;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::{Failure, Outcome, output, terminal};
-use mirrorstats_exact::escape::visible;
-use mirrorstats_exact::format::counted;
-use mirrorstats_report::layout;
-use mirrorstats_score::quality::QualityByCell;
-use mirrorstats_study::quality::{CellAnswer, has_quality, quality};
-use mirrorstats_tables::{Table, wrapped};
+use mirrorstats_study::contents::{Contents, episode_list};
 use mirrorstats_trace::footers::answered::by_others;
-use mirrorstats_trace::footers::checksums::Checksums;
-use mirrorstats_trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
+use mirrorstats_trace::info::{Listing, info};
 
 /// Summarise traces: episodes, steps, models, experiments, coverage, files
 #[derive(Clone, Debug, clap::Args)]
@@ -31,16 +21,6 @@ pub struct InfoCommand {
     json: bool,
 }
 
-/// The answer for a program.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct InfoAnswer {
-    /// The contents of the traces.
-    #[serde(flatten)]
-    pub info: Info,
-    /// The reply quality by cell; empty if the traces do not record it.
-    pub quality: Vec<CellAnswer>,
-}
-
 impl InfoCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let study = self.input.open()?;
@@ -48,141 +28,12 @@ impl InfoCommand {
         output::notes(&by_others(study.traces()?.files()));
         let info = info(study.traces()?, listing, self.input.threads.count())?;
         if let Some(episodes) = info.episode_list.as_ref().filter(|_| !self.json) {
-            write!(io::stdout().lock(), "{}", list_of(episodes).within(terminal::width()))?;
-            return Ok(Outcome::Done);
+            return output::plain(episode_list(episodes).within(terminal::width()));
         }
-        let cells = if has_quality(&study)? { quality(&study)? } else { QualityByCell::default() };
-        let mut out = io::stdout().lock();
+        let contents = Contents::of(&study, info)?;
         if self.json {
-            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: CellAnswer::of_all(&cells) }))?;
-        } else {
-            print(&mut out, &info, terminal::width())?;
-            let text = layout::quality::text(&cells, terminal::width());
-            if !text.is_empty() {
-                writeln!(out, "\nreplies by experiment and model\n{text}")?;
-            }
+            return output::plain(format!("{:#}\n", json!(contents.answer())));
         }
-        Ok(Outcome::Done)
+        output::plain(contents.render(terminal::width()))
     }
-}
-
-fn print(out: &mut impl Write, info: &Info, width: Option<usize>) -> io::Result<()> {
-    let bytes: u64 = info.files.iter().map(|file| file.bytes).sum();
-    let (episodes, steps) = (counted(info.episodes, "episode"), counted(info.steps, "step"));
-    writeln!(out, "{episodes}, {steps}, {}, {}\n", counted(info.files.len() as u64, "file"), counted(bytes, "byte"))?;
-    list(out, "models", &info.models, ", ", width)?;
-    list(out, "experiments", &info.experiments, ", ", width)?;
-    list(out, "seeds", &info.seeds, ", ", width)?;
-    list(out, "runs", &info.runs, ", ", width)?;
-    if !info.renderers.is_empty() {
-        list(out, "renderers", &info.renderers, "; ", width)?;
-    }
-    let own: Vec<_> = info.columns.iter().filter(|column| !column.known).map(|column| &column.name).collect();
-    if !own.is_empty() {
-        list(out, "own columns", &own, ", ", width)?;
-    }
-    if let Some(replies) = info.replies.as_ref().filter(|replies| replies.all_unreadable() > 0) {
-        let (bad, all) = (replies.all_unreadable(), replies.replies);
-        writeln!(out, "\n{bad} of {all} replies could not be read: {replies} (`reply_status`)")?;
-    }
-    write!(out, "\nepisodes by experiment and model\n{}", coverage(info).within(width))?;
-    gaps(out, info)?;
-    write!(out, "\nfiles\n{}", files(info).within(width))
-}
-
-fn list(
-    out: &mut impl Write,
-    what: &str,
-    values: &[impl Display],
-    between: &str,
-    width: Option<usize>,
-) -> io::Result<()> {
-    let shown: Vec<_> = values.iter().map(|value| visible(&value.to_string())).collect();
-    let head = format!("{what:<12} {:>3}   ", values.len());
-    let indent = head.len();
-    let lines = wrapped(&shown.join(between), width.map_or(usize::MAX, |width| width.saturating_sub(indent)), 0);
-    writeln!(out, "{head}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
-}
-
-fn coverage(info: &Info) -> Table {
-    let header = std::iter::once("model").chain(info.experiments.iter().map(String::as_str));
-    let mut table = Table::of_texts(header).aligned_right(1..=info.experiments.len());
-    for (row, model) in info.models.iter().enumerate() {
-        // Cells are ordered by experiment, with all models for each.
-        let counts = info.coverage.iter().skip(row).step_by(info.models.len()).map(|cell| match cell.episodes {
-            0 => "none".to_owned(),
-            episodes => episodes.to_string(),
-        });
-        table.push(std::iter::once(model.clone()).chain(counts));
-    }
-    table
-}
-
-const LISTED: usize = 8;
-
-fn gaps(out: &mut impl Write, info: &Info) -> io::Result<()> {
-    let incomplete: Vec<&Cell> = info.coverage.iter().filter(|cell| !cell.missing.is_empty()).collect();
-    if incomplete.is_empty() {
-        writeln!(out, "\nevery cell has every seed and run that any cell has")?;
-    } else {
-        writeln!(out, "\nmissing (seed/run), of those that other cells have")?;
-    }
-    for cell in incomplete {
-        let what = if cell.episodes == 0 { "all".to_owned() } else { pairs(&cell.missing) };
-        writeln!(out, "  {}, {}: {what}", visible(&cell.experiment), visible(&cell.model))?;
-    }
-    let repeated = info.coverage.iter().filter(|cell| !cell.repeated.is_empty());
-    for (i, cell) in repeated.enumerate() {
-        if i == 0 {
-            writeln!(out, "\nmore than one episode (seed/run)")?;
-        }
-        writeln!(out, "  {}, {}: {}", visible(&cell.experiment), visible(&cell.model), pairs(&cell.repeated))?;
-    }
-    Ok(())
-}
-
-fn pairs(pairs: &[SeedRun]) -> String {
-    let shown: Vec<_> = pairs.iter().take(LISTED).map(|pair| format!("{}/{}", pair.seed, pair.run)).collect();
-    match pairs.len().saturating_sub(LISTED) {
-        0 => shown.join(" "),
-        more => format!("{} and {more} more", shown.join(" ")),
-    }
-}
-
-fn list_of(episodes: &[EpisodeInfo]) -> Table {
-    let header = ["episode", "experiment", "model", "seed", "run", "steps", "file"];
-    let rows = episodes.iter().map(|episode| {
-        [
-            episode.episode_id.clone(),
-            episode.experiment.clone(),
-            episode.model.clone(),
-            episode.seed.to_string(),
-            episode.run.to_string(),
-            episode.steps.to_string(),
-            episode.file.clone(),
-        ]
-    });
-    Table::of_texts(header).aligned_right(3..=5).with(rows)
-}
-
-fn files(info: &Info) -> Table {
-    let header = ["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "checksums", "writer"];
-    let rows = info.files.iter().map(|file| {
-        [
-            file.name.clone(),
-            file.episodes.to_string(),
-            file.steps.to_string(),
-            file.row_groups.to_string(),
-            file.bytes.to_string(),
-            file.sha256.chars().take(12).collect(),
-            file.schema_version.as_deref().unwrap_or("not named").to_owned(),
-            match file.checksums {
-                Checksums::None => "none".to_owned(),
-                Checksums::Stale => "stale".to_owned(),
-                Checksums::Present => "present".to_owned(),
-            },
-            file.writer.as_deref().unwrap_or("not named").to_owned(),
-        ]
-    });
-    Table::of_texts(header).aligned_right(1..=4).with(rows)
 }

@@ -1,16 +1,14 @@
 //! `mirrorstats world filmstrip`: one episode as a row of frames.
 
 use std::ffi::OsString;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_figures::film_strip::{Still, film_strip};
 use mirrorstats_figures::{Figure, FigureFormat};
-use mirrorstats_record::replay::filmstrip::{PngFrame, Reel, Strip};
+use mirrorstats_record::replay::filmstrip::{PngFrame, RecordedFiles, Reel};
 use mirrorstats_trace::episodes::episode::{Action, Step};
 use mirrorstats_trace::episodes::moments::moments;
-use mirrorstats_trace::inputs;
 
 /// Draw one episode as a row of frames: what was done and claimed at each, and when the mirror was in view
 ///
@@ -49,46 +47,11 @@ impl FilmstripArgs {
     }
 
     fn figure(&self) -> Result<Figure, Failure> {
-        let strip = Strip { episode: self.episode.clone(), count: usize::from(self.count) };
-        let (logs, traces) = self.sources()?;
-        output::check_target(&self.out, &logs)?;
-        let files = if traces.is_empty() { Ok(Vec::new()) } else { inputs::resolve(&traces, io::stdin()) };
-        let files = files?;
-        output::note_stale_checksums(&files);
-        output::check_target(&self.out, files.iter().map(|file| &file.path))?;
-        if let Some(reel) = strip.from_logs(&logs, &files)? {
-            return Ok(draw(&reel));
-        }
-        if !files.is_empty()
-            && let Some(reel) = strip.from_traces(&files)?
-        {
-            return Ok(draw(&reel));
-        }
-        Err(Failure::input(format!(
-            "no log or trace in {} has the episode `{}`; `mirrorstats trace info --episodes` lists those of traces",
-            self.recordings.iter().map(|named| named.to_string_lossy()).collect::<Vec<_>>().join(", "),
-            self.episode
-        )))
-    }
-
-    fn sources(&self) -> Result<(Vec<PathBuf>, Vec<OsString>), Failure> {
-        let (mut logs, mut traces) = (Vec::new(), Vec::new());
-        for named in &self.recordings {
-            let path = Path::new(named);
-            if path.is_dir() {
-                let entries = std::fs::read_dir(path)
-                    .map_err(|error| Failure::input(format!("cannot read `{}`: {error}", path.display())))?;
-                let mut found: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-                found.sort();
-                traces.extend(found.iter().any(|path| ends_in(path, "parquet")).then(|| named.clone()));
-                logs.extend(found.into_iter().filter(|path| ends_in(path, "mcap")));
-            } else if ends_in(path, "mcap") {
-                logs.push(path.to_owned());
-            } else {
-                traces.push(named.clone());
-            }
-        }
-        Ok((logs, traces))
+        let Self { episode, recordings, count, out } = self;
+        let recordings = RecordedFiles::of(recordings)?;
+        output::note_stale_checksums(&recordings.traces);
+        output::check_target(out, recordings.files())?;
+        Ok(draw(&recordings.reel(episode, usize::from(*count))?))
     }
 }
 
@@ -116,8 +79,4 @@ fn still(PngFrame { t, png, size }: &PngFrame, step: &Step, moments: Vec<&'stati
         (None, None) => "no claim".to_owned(),
     };
     Still { t: *t, png: png.clone(), size: *size, action, claim, visible: step.mirror_visible, moments }
-}
-
-fn ends_in(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|found| found == ending)
 }

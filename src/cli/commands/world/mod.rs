@@ -1,20 +1,20 @@
 //! `mirrorstats world`: the parts of the experiments, without running any.
 
-#[cfg(feature = "raster")]
-mod contact_sheet;
 pub mod filmstrip;
-pub mod record;
 pub mod replay;
+mod visibility;
 
 use std::path::PathBuf;
 
 use serde_json::json;
 
-use crate::cli::{Failure, Outcome, experiments, output};
+use crate::cli::{Failure, Outcome, args, output};
+#[cfg(feature = "raster")]
+use mirrorstats_figures::contact_sheet::{self, Picture};
 use mirrorstats_record::plan::Experiments;
 use mirrorstats_sim::config::WorldConfig;
 #[cfg(feature = "raster")]
-use mirrorstats_sim::contact_sheet::row;
+use mirrorstats_sim::contact_sheet::{SheetPicture, row};
 use mirrorstats_sim::scene::Scene;
 
 /// Replay episodes, draw film strips, show scenes
@@ -34,7 +34,7 @@ enum WorldVerb {
     /// Print the scene of one episode as JSON, a scene for each experiment
     Scene {
         /// The experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
-        #[arg(value_name = "LIST", value_parser = experiments::parser())]
+        #[arg(value_name = "LIST", value_parser = args::experiments())]
         experiments: Experiments,
         /// The seed of the block of runs
         #[arg(long, default_value_t = 1)]
@@ -46,6 +46,15 @@ enum WorldVerb {
         #[arg(long, value_name = "FILE")]
         config: Option<PathBuf>,
     },
+    /// Print where agents see themselves, and how many steps the shortest ways take, as a table in Markdown
+    Visibility {
+        /// The experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
+        #[arg(value_name = "LIST", default_value = "E1..E5", value_parser = args::experiments())]
+        experiments: Experiments,
+        /// A TOML file whose values lie over the built-in configuration
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+    },
     /// Draw the contact sheet: experiments from above and as the agent sees them
     #[cfg(feature = "raster")]
     Sheet {
@@ -53,7 +62,7 @@ enum WorldVerb {
         #[arg(short, long, value_name = "DIR", default_value = "reports/world")]
         out: PathBuf,
         /// The experiments, one row each: E1, E1..E5, E1,E3, or a file such as mine.toml
-        #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = experiments::parser())]
+        #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = args::experiments())]
         experiment: Experiments,
         /// The seed of the scenes
         #[arg(long, default_value_t = 1)]
@@ -78,22 +87,35 @@ impl WorldArgs {
             WorldVerb::Config => output::plain(WorldConfig::default_text()),
             WorldVerb::Scene { experiments, seed, run, config } => {
                 let config = configured(config.as_ref())?;
-                for experiment in experiments::asked(&experiments, &config)? {
+                for experiment in experiments.load(&config)? {
                     output::plain(format!("{:#}\n", json!(Scene::draw(&config, experiment, seed, run)?)))?;
                 }
                 Ok(Outcome::Done)
+            }
+            WorldVerb::Visibility { experiments, config } => {
+                let config = configured(config.as_ref())?;
+                let rows =
+                    experiments.load(&config)?.into_iter().map(|experiment| visibility::row(&config, &experiment));
+                output::plain(visibility::HEAD.to_owned() + &rows.collect::<Result<String, _>>()?)
             }
             #[cfg(feature = "raster")]
             WorldVerb::Sheet { out, experiment, seed, config: file } => {
                 let config = configured(file.as_ref())?;
                 let target = out.join("sheet.png");
                 output::check_target(&target, &file)?;
-                let experiments = experiments::asked(&experiment, &config)?;
+                let experiments = experiment.load(&config)?;
                 let rows = experiments.iter().map(|experiment| row(&config, experiment, seed));
-                let png = contact_sheet::png(&rows.collect::<Result<Vec<_>, _>>()?)?;
+                let rows = rows.collect::<Result<Vec<_>, _>>()?;
+                let pictures: Vec<Vec<_>> = rows.iter().map(|row| row.iter().map(picture).collect()).collect();
+                let png = contact_sheet::png(&pictures).map_err(Failure::input)?;
                 output::make_folder(&out)?;
                 output::write_file(&target, &png).map(|()| Outcome::Done)
             }
         }
     }
+}
+
+#[cfg(feature = "raster")]
+fn picture(SheetPicture { frame, caption }: &SheetPicture) -> Picture<'_> {
+    Picture { rgb: &frame.rgb, width: frame.width, height: frame.height, caption }
 }

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
-use mirrorstats_exact::replace::{self, is_same_file};
-use mirrorstats_log::read::{episode_hashes, other_episode};
-use mirrorstats_record::replay::error::{Divergence, ReplayError};
-use mirrorstats_record::replay::verify::{FramesAnswer, Outputs, RecordedTrace, ReplayAnswer, frame_path};
+use mirrorstats_exact::replace;
+use mirrorstats_record::replay::error::Divergence;
+use mirrorstats_record::replay::outputs::Outputs;
+use mirrorstats_record::replay::verify::{FramesAnswer, RecordedTrace, ReplayAnswer};
 use mirrorstats_trace::footers::renderer::Renderer;
 use mirrorstats_trace::inputs;
 
@@ -44,69 +44,14 @@ impl ReplayArgs {
         let files = inputs::resolve(&self.traces, io::stdin())?;
         output::note_stale_checksums(&files);
         let traces = RecordedTrace::open(&files, self.episode.as_deref())?;
-        if traces.len() > 1 && self.mcap.is_some() {
-            return Err(Failure::input("--mcap takes a single trace"));
-        }
-        RecordedTrace::check_work(&traces)?;
-        self.check_targets(&traces)?;
+        let outputs = Outputs { frames: self.frames.clone(), log: self.mcap.clone() };
+        outputs.check(&traces, self.episode.as_deref())?;
         let mut answer = ReplayAnswer::default();
         for trace in &traces {
-            trace.replay(&self.outputs(), &mut answer, save)?;
+            trace.replay(&outputs, &mut answer, save)?;
         }
         output::print_with(&answer, self.json, write_answer)?;
         Ok(if answer.divergences.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
-    }
-
-    fn outputs(&self) -> Outputs {
-        Outputs { frames: self.frames.clone(), log: self.mcap.clone() }
-    }
-
-    fn check_targets(&self, traces: &[RecordedTrace]) -> Result<(), Failure> {
-        let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
-        if self.mcap.as_ref().is_some_and(is_trace) {
-            return Err(Failure::input("--mcap is the trace itself; name another file"));
-        }
-        for (folder, trace) in self.frames.iter().flat_map(|folder| traces.iter().map(move |trace| (folder, trace))) {
-            for (rows, t) in trace.rows.iter().flat_map(|rows| (1..=rows.len()).map(move |t| (rows, t))) {
-                output::check_target(&frame_path(folder, &rows.episode_id, t), traces.iter().map(|trace| &trace.path))?;
-            }
-        }
-        self.check_log()?;
-        self.check_hashes(traces)
-    }
-
-    fn check_hashes(&self, traces: &[RecordedTrace]) -> Result<(), Failure> {
-        // A file that is not a readable log may be replaced.
-        let Some((log, logged)) = self.mcap.as_ref().and_then(|log| Some((log, episode_hashes(log).ok()?))) else {
-            return Ok(());
-        };
-        for (trace, rows) in traces.iter().flat_map(|trace| trace.rows.iter().map(move |rows| (trace, rows))) {
-            let hashes = rows.stated_hash().zip(logged.get(&rows.episode_id));
-            if let Some((traced, logged)) = hashes.filter(|(traced, logged)| traced != *logged) {
-                let name = trace.path.display().to_string();
-                return Err(ReplayError::apart(&rows.episode_id, (&name, &traced), (log, logged)).into());
-            }
-        }
-        Ok(())
-    }
-
-    fn check_log(&self) -> Result<(), Failure> {
-        let (Some(path), Some(id)) = (&self.mcap, &self.episode) else { return Ok(()) };
-        if !path.is_file() {
-            return Ok(());
-        }
-        let found = match other_episode(path, id) {
-            Ok(None) => return Ok(()),
-            Ok(Some(other)) => format!("one with the episode `{other}`"),
-            Err(error) => {
-                let error = error.to_string();
-                format!("a file whose episodes cannot be read ({})", error.lines().next().unwrap_or_default())
-            }
-        };
-        Err(Failure::Rendered(format!(
-            "error: `{}`: expected no file, or a log of the episode `{id}` alone, found {found}\n  help: give --mcap another name, or leave out --episode to replace the whole log",
-            path.display()
-        )))
     }
 }
 

@@ -1,19 +1,19 @@
 //! One block minus another under one metric: paired if they have pairs, else as independent samples.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::durations::{decided, is_duration};
-use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::matching::{Matched, Sides, Units, outcomes};
-use crate::statistics::retest::repeat_variance;
+use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::comparisons::matching::{Matched, Sides, Units, outcomes};
+use crate::statistics::comparisons::retest::repeat_variance;
+use crate::statistics::rates::durations::{decided, is_duration};
 use crate::study::{Block, Study, Unit};
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_metric::catalogs::catalog::{Kind, StandardError};
+use mirrorstats_metric::catalogs::catalog::{Kind, Metric, StandardError};
 use mirrorstats_score::tables::table::MetricColumn;
-use mirrorstats_statistics::comparisons::holm::level;
+use mirrorstats_statistics::comparisons::holm::{is_significant, level};
 use mirrorstats_statistics::comparisons::paired::Pairs;
 use mirrorstats_statistics::comparisons::units;
 use mirrorstats_statistics::comparisons::unpaired::{fisher, newcombe, welch};
@@ -62,8 +62,11 @@ pub struct Comparison {
     pub undefined: u64,
     /// The horizon of restricted means, in steps.
     pub horizon: Option<i64>,
-    /// The first mean minus the second, over the episodes compared.
+    /// The first mean minus the second: over the units, where each counts once, else over the episodes compared.
     pub difference: Option<f64>,
+    /// The means of both sides with each unit counted once; null if each episode is its own unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_means: Option<[f64; 2]>,
     /// Its interval, not adjusted for the number of comparisons.
     pub interval: Option<Interval>,
     /// The reason why there is no interval.
@@ -72,8 +75,12 @@ pub struct Comparison {
     /// again; none unless both sides repeat scenes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub repeat_se: Option<f64>,
-    /// The p value, two-sided: exact and by minimum likelihood for rates, by Student's t for durations.
+    /// The p value, two-sided: exact and by minimum likelihood for rates; for durations by Student's t, and by permutation
+    /// where the sides have unequal sizes.
     pub p: Option<f64>,
+    /// The Monte Carlo standard error of `p`, where sides of unequal size are permuted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p_error: Option<f64>,
     /// The mid-p value of a rate, which is not guaranteed to keep the level.
     pub mid_p: Option<f64>,
     /// `p` adjusted by Holm's method over the family.
@@ -86,6 +93,10 @@ pub struct Comparison {
     /// The test with the lost episodes of both sides; none if none was lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<LossCases>,
+    /// The reason why the difference only describes these episodes and has no test: a condition selects them, or sides share
+    /// seeds unevenly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub selected: Option<String>,
     /// The setting in which the two sides were recorded differently, so that nothing is compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub incomparable: Option<String>,
@@ -101,10 +112,26 @@ pub(crate) struct Compared<'s, 'a> {
 }
 
 impl Compared<'_, '_> {
-    /// The comparison under one metric, before adjustment.
+    /// The comparison under one metric, in its unit, before adjustment.
     pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
+        let found = self.stored(column);
+        match self.study.metric(&column.name) {
+            Some(metric) => found.in_unit(metric),
+            None => found,
+        }
+    }
+
+    /// The comparison of the stored values.
+    fn stored(&self, column: &MetricColumn) -> Comparison {
         let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
         let found = self.assuming(None, column, sides.as_ref());
+        let selected = selection(self.study, column, [self.first, self.second]);
+        if let Some(selected) = selected.or_else(|| self.against_seeds(column, &found)) {
+            let Comparison { method, n, successes, difference, unit_means, undefined, .. } = found;
+            let (withheld, selected) = (Some(Withheld::Selected), Some(selected));
+            let untested = Comparison::of(method, n);
+            return Comparison { successes, undefined, difference, unit_means, withheld, selected, ..untested };
+        }
         let lost = if found.p.is_some() { self.lost() } else { 0 };
         let losses = LossCases::of(lost, |toward| {
             let Comparison { difference, p, .. } = self.assuming(Some(toward), column, sides.as_ref());
@@ -113,6 +140,26 @@ impl Compared<'_, '_> {
         let noise = |block| repeat_variance(self.study, block, column);
         let repeat_se = noise(self.first).zip(noise(self.second)).map(|(a, b)| (a + b).sqrt());
         Comparison { repeat_se, losses, ..found }
+    }
+
+    /// The reason to withhold a significant difference of independent rates: the sides have unequal shares of the seeds,
+    /// and within seeds the difference has the other sign (Simpson 1951). The common difference weights each seed as
+    /// Mantel and Haenszel (1959) do.
+    fn against_seeds(&self, column: &MetricColumn, found: &Comparison) -> Option<String> {
+        let is_shown = found.p.is_some_and(|p| is_significant(p, self.confidence));
+        if found.method != Method::Fisher || !is_shown || !self.study.design.has_pairs() {
+            return None;
+        }
+        let mut seeds: BTreeMap<i32, [(i64, i64); 2]> = BTreeMap::new();
+        for (side, block) in [self.first, self.second].into_iter().enumerate() {
+            for (row, value) in block.rows().filter_map(|row| Some((row, column.get(row)?))) {
+                let (n, sum) = &mut seeds.entry(self.study.table.keys.seed(row)).or_default()[side];
+                (*n, *sum) = (*n + 1, *sum + value);
+            }
+        }
+        let common = |[(m, a), (n, b)]: &[(i64, i64); 2]| (a * n - b * m) as f64 / (m + n) as f64;
+        let common: f64 = seeds.values().map(common).sum();
+        (common * found.difference? < 0.0).then(|| "the difference within seeds has the other sign".to_owned())
     }
 
     /// The comparison without the lost episodes of both sides, or with them. In a comparison by pairs or units, each
@@ -149,9 +196,12 @@ impl Compared<'_, '_> {
         let test = sides.test(&lost.map_or_else(Vec::new, |toward| toward.units(self.lost())));
         let least = test.map_or(1.0, |test| test.least);
         let pairs = self.matched.pairs.as_ref().filter(|_| !self.is_dependent());
+        let [first, second] = sides.means();
+        let unit_means = first.zip(second).map(<[f64; 2]>::from);
         Comparison {
             successes: a.counts().zip(b.counts()).map(|(a, b)| [a.0, b.0]),
-            difference: a.mean().zip(b.mean()).map(|(a, b)| a - b),
+            difference: test.map(|test| test.difference).or_else(|| unit_means.map(|[a, b]| a - b)),
+            unit_means,
             withheld: Some(Withheld::Dependent),
             pairs: pairs.map(|rows| outcomes(column, rows)),
             p: test.map(|test| test.p),
@@ -164,8 +214,12 @@ impl Compared<'_, '_> {
     fn quantity_by_unit(&self, lost: Option<Toward>, column: &MetricColumn) -> Comparison {
         let seen = self.of_episodes(None, column);
         let seen = Comparison { interval: None, withheld: Some(Withheld::Dependent), p: None, ..seen };
+        let of_units =
+            |value: &dyn Fn(usize) -> Option<i64>| Sides::by(self.study, &[(self.first, self.second)], value);
         if !is_duration(self.study, &column.name) {
-            return seen;
+            let [first, second] = of_units(&|row| column.get(row)).means();
+            let unit_means = first.zip(second).map(<[f64; 2]>::from);
+            return Comparison { difference: unit_means.map(|[a, b]| a - b), unit_means, ..seen };
         }
         let rows = || [self.first, self.second].into_iter().flat_map(Block::rows);
         let Some(horizon) = seen.horizon else { return seen };
@@ -179,8 +233,9 @@ impl Compared<'_, '_> {
             return Comparison { units: Some(units), ..seen };
         }
         let time = |row| decided(self.study, column, row).map(|end| end.steps.min(horizon));
-        let times = Sides::by(self.study, &[(self.first, self.second)], time).divided();
-        let Some(mut sides) = times else { return seen };
+        let times = of_units(&time);
+        let [first, second] = times.means();
+        let Some(mut sides) = times.divided() else { return seen };
         if let Some(toward) = lost {
             self.add_lost(&mut sides, horizon, toward);
         }
@@ -191,7 +246,7 @@ impl Compared<'_, '_> {
         let units = Units::new(self.study, self.first, n, least, self.confidence);
         let method = if is_paired { Method::RestrictedMeanPaired } else { Method::RestrictedMean };
         let tested = Comparison::of_durations(method, [n as u64; 2], found, self.confidence);
-        Comparison { n: seen.n, units: Some(units), ..tested }
+        Comparison { n: seen.n, units: Some(units), unit_means: first.zip(second).map(<[f64; 2]>::from), ..tested }
     }
 
     /// Adds each lost episode as its own unit, decided at once or never.
@@ -305,9 +360,31 @@ impl Compared<'_, '_> {
     }
 }
 
+/// The selection of two sides by the condition of a metric, such as success; `None` if the metric is defined in all their
+/// episodes or in none of a side. What selects episodes may be what the sides differ in, so that a difference among the selected ones is no
+/// difference of the sides (Frangakis and Rubin 2002, principal stratification).
+pub(crate) fn selection(study: &Study, column: &MetricColumn, sides: [&Block; 2]) -> Option<String> {
+    let counts = sides.map(|block| (block.moments(column).n, block.rows().count() as u64));
+    // A side without any value is not compared at all.
+    let is_part = counts.iter().any(|(defined, all)| defined < all) && counts.iter().all(|(defined, _)| *defined > 0);
+    let is_conditional = study.metric(&column.name).is_some_and(|metric| metric.when.is_some());
+    let [(a, m), (b, n)] = counts;
+    (is_conditional && is_part).then(|| format!("defined in {a} of {m} against {b} of {n} episodes"))
+}
+
 impl Comparison {
     fn of(method: Method, n: [u64; 2]) -> Self {
         Self { method, n, ..Self::default() }
+    }
+
+    fn in_unit(self, metric: &Metric) -> Self {
+        let number = |stored: f64| metric.in_unit(stored);
+        Self {
+            difference: self.difference.map(number),
+            unit_means: self.unit_means.map(|means| means.map(number)),
+            interval: self.interval.map(|interval| in_unit(interval, metric)),
+            ..self
+        }
     }
 
     pub(crate) fn unless(self, incomparable: Option<String>) -> Self {
@@ -333,6 +410,7 @@ impl Comparison {
             interval,
             withheld,
             p: found.and_then(|found| found.p).filter(|_| n[0].min(n[1]) >= least),
+            p_error: found.and_then(|found| found.p_error).filter(|_| n[0].min(n[1]) >= least),
             ..Self::of(method, n)
         }
     }
@@ -369,6 +447,11 @@ impl Comparison {
         let difference = self.difference.filter(|_| self.separated)?;
         Some(if difference > 0.0 { Sign::Higher } else { Sign::Lower })
     }
+}
+
+/// An interval of stored values in the unit of their metric.
+pub(crate) fn in_unit(Interval { low, high }: Interval, metric: &Metric) -> Interval {
+    Interval { low: metric.in_unit(low), high: metric.in_unit(high) }
 }
 
 fn fewest_of(confidence: f64) -> u64 {

@@ -5,8 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::comparable::tasks_differ;
-use crate::statistics::compare::{Compared, Comparison, adjust};
-use crate::statistics::matching::{Matched, Matching, Scenes};
+use crate::statistics::comparisons::compare::{Compared, Comparison, adjust};
+use crate::statistics::comparisons::matching::{Matched, Matching, Scenes};
 use crate::study::{Block, Experiment, Study, named};
 use mirrorstats_score::tables::table::MetricColumn;
 
@@ -68,7 +68,6 @@ impl<'s, 'a> ConditionPair<'s, 'a> {
 }
 
 impl Contrast {
-    /// The model, with its condition if there are several.
     pub(crate) fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())
     }

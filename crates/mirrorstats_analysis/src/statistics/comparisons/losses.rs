@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::matching::Units;
+use crate::statistics::comparisons::matching::Units;
 use crate::study::{Block, RowKey, Study};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_score::tables::table::MetricColumn;
@@ -83,7 +83,6 @@ impl Toward {
         lost.map_or(known, |toward| toward.moments(known, block.lost, is_first))
     }
 
-    /// The pairs including the lost episodes of both sides.
     pub fn pairs(self, known: Pairs, lost: u64) -> Pairs {
         match self {
             Self::Lowest => Pairs { second_only: known.second_only + lost, ..known },
@@ -104,7 +103,6 @@ impl Toward {
 }
 
 impl LossCases {
-    /// Both cases; `None` without lost episodes.
     pub(crate) fn of(lost: u64, case: impl Fn(Toward) -> LossCase) -> Option<Self> {
         let both = || Self { lost, lowest: case(Toward::Lowest), highest: case(Toward::Highest), agree: true };
         (lost > 0).then(both)

@@ -84,6 +84,7 @@ impl Matched {
         matching.alone += only_second.map(|(_, rows)| rows.len() as u64).sum::<u64>();
         matching.pairs = pairs.len() as u64;
         let most = first.episodes().max(second.episodes());
+        // A test of fewer pairs would leave out most of the episodes.
         matching.paired = !pairs.is_empty() && 2 * matching.pairs >= most;
         Self { matching, pairs: matching.paired.then_some(pairs) }
     }
@@ -122,7 +123,6 @@ impl Units {
     }
 }
 
-/// The name of one of them.
 pub(crate) fn singular(plural: &str) -> &str {
     plural.strip_suffix('s').unwrap_or(plural)
 }
@@ -150,7 +150,6 @@ impl Sides {
         (repeats || is_partly_shared).then_some(sides)
     }
 
-    /// The sides for any value of an episode.
     pub fn by(study: &Study, strata: &[(&Block, &Block)], value: impl Fn(usize) -> Option<i64>) -> Self {
         let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
         let add = |sum: &mut Moments, part: Moments| {
@@ -167,6 +166,14 @@ impl Sides {
             }
         }
         Self { units }
+    }
+
+    /// The means of both sides, with each unit counted once.
+    pub fn means(&self) -> [Option<f64>; 2] {
+        let side = |of: fn(&(Moments, Moments)) -> Moments| -> Vec<Moments> {
+            self.units.values().map(of).filter(|side| side.n > 0).collect()
+        };
+        [units::mean(&side(|unit| unit.0)), units::mean(&side(|unit| unit.1))]
     }
 
     /// The units on the smaller side.

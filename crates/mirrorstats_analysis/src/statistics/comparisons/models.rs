@@ -6,9 +6,9 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::compare::{Compared, Comparison, Method, adjust};
-use crate::statistics::durations::{self, is_duration};
-use crate::statistics::matching::{Matched, Matching, Scenes};
+use crate::statistics::comparisons::compare::{Compared, Comparison, Method, adjust};
+use crate::statistics::comparisons::matching::{Matched, Matching, Scenes};
+use crate::statistics::rates::durations::{self, is_duration};
 use crate::study::{Block, Experiment, RowKey, Study};
 use mirrorstats_metric::catalogs::catalog::{Better, Kind};
 use mirrorstats_score::tables::table::MetricColumn;
@@ -23,7 +23,8 @@ pub struct Family {
     pub experiment: String,
     /// The metric, a rate or a duration.
     pub metric: String,
-    /// The models, best mean first (of durations the restricted mean); by name where means are equal. A model with
+    /// The models, best mean first (of durations the restricted mean), each unit counted once; by name where means are
+    /// equal. A model with
     /// conditions is there once per condition, as `model [condition]`.
     pub models: Vec<String>,
     /// Sets of models that no adjusted test tells apart, each as large as can be; they may overlap.
@@ -52,7 +53,7 @@ pub struct Reach {
 /// One model against another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PairTest {
-    /// The model with the better mean.
+    /// The model that the estimate of this comparison favours.
     pub first: String,
     /// The other one.
     pub second: String,
@@ -100,6 +101,23 @@ impl<'s, 'a> MatchedBlocks<'s, 'a> {
         let compared = Compared { study, first, second, matched, horizon, confidence };
         let comparison = compared.under(column).unless(study.incomparable(first, second));
         PairTest { first: first.name(), second: second.name(), matching: matched.matching, comparison }
+    }
+
+    /// The test of a pair with the better side of its own estimate first. Pairs use the scenes of both models only, so
+    /// their difference may point the other way than the models' means.
+    fn better_first(
+        &self,
+        column: &MetricColumn,
+        (first, second): (usize, usize),
+        asked: (Option<i64>, f64),
+    ) -> PairTest {
+        let found = self.test(column, (first, second), asked);
+        let is_lower = self.study.better(&column.name) == Better::Lower;
+        let is_worse = |difference: f64| if is_lower { difference > 0.0 } else { difference < 0.0 };
+        if found.comparison.difference.is_some_and(is_worse) {
+            return self.test(column, (second, first), asked);
+        }
+        found
     }
 
     fn gaps(&self) -> Vec<Gap> {
@@ -161,7 +179,7 @@ impl Family {
         let order = best_first(field, column, asked.0);
         let mut tests = Vec::new();
         for (at, &first) in order.iter().enumerate() {
-            tests.extend(order[at + 1..].iter().map(|&second| field.test(column, (first, second), asked)));
+            tests.extend(order[at + 1..].iter().map(|&second| field.better_first(column, (first, second), asked)));
         }
         adjust(tests.iter_mut().map(|test| &mut test.comparison), asked.1);
         let models: Vec<String> = order.iter().map(|&at| field.blocks[at].name()).collect();
@@ -195,7 +213,7 @@ impl Reach {
 fn best_first(field: &MatchedBlocks, column: &MetricColumn, horizon: Option<i64>) -> Vec<usize> {
     let mean = |block: &Block| match horizon {
         Some(horizon) => durations::restricted(field.study, block, column, horizon),
-        None => block.moments(column).mean(),
+        None => field.study.mean(block, column),
     };
     let means: Vec<Option<f64>> = field.blocks.iter().map(mean).collect();
     let better = field.study.better(&column.name);

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::matching::Scenes;
-use crate::study::{Block, Study};
+use crate::statistics::comparisons::matching::Scenes;
+use crate::study::{Block, RowKey, Study};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::intervals::clustered::variance_components;
@@ -17,13 +17,8 @@ use mirrorstats_statistics::intervals::clustered::variance_components;
 /// The verdicts of one model on scenes that it played more than once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RetestRow {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The condition, where there are more than the default one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub condition: Option<String>,
+    #[serde(flatten)]
+    pub key: RowKey,
     /// The metric, a rate.
     pub metric: String,
     /// Scenes that were played at least twice with a defined value.
@@ -62,9 +57,7 @@ impl RetestRow {
         let (count, counts) = (scenes.len() as u64, || scenes.iter().filter_map(|scene| scene.counts()));
         let flipped: f64 = counts().map(|(k, m)| (2 * k * (m - k)) as f64 / (m * (m - 1)) as f64).sum();
         (count > 0).then(|| Self {
-            experiment: block.experiment.to_owned(),
-            model: block.model.to_owned(),
-            condition: block.condition(),
+            key: block.key(),
             metric: column.name.clone(),
             scenes: count,
             episodes: scenes.iter().map(|scene| scene.n).sum(),
@@ -89,7 +82,6 @@ fn times(study: &Study, block: &Block) -> Times {
     times
 }
 
-/// The moments of each scene, separately for each person.
 fn sums(times: &Times, value: impl Fn(usize) -> Option<i64>) -> Vec<Moments> {
     let add = |sum: Moments, value| sum.with(value).expect("a part of a block that was summed whole");
     let moments = |rows: &Vec<usize>| rows.iter().filter_map(|row| value(*row)).fold(Moments::default(), add);

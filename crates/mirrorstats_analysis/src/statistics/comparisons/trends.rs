@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::chance::Verdict;
+use crate::statistics::comparisons::compare::selection;
+use crate::statistics::rates::chance::Verdict;
 use crate::study::{Block, Study, Unit};
 use mirrorstats_metric::catalogs::catalog::Factor;
 use mirrorstats_score::tables::table::MetricColumn;
@@ -53,6 +54,9 @@ pub struct Dose {
     pub successes: u64,
     /// The episodes in which the metric is defined.
     pub n: u64,
+    /// The mean over units, each counted once, as in the test; null if each episode is its own unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_mean: Option<f64>,
 }
 
 /// The fewest scenes, other units or independent episodes for which the asymptotic test is valid.
@@ -83,21 +87,21 @@ impl TrendRow {
     }
 
     fn of(study: &Study, (name, factor): (&str, &Factor), blocks: &[(f64, &Block)], column: &MetricColumn) -> Self {
-        let (mut strata, mut doses) = (BTreeMap::<Option<Unit>, Vec<(f64, bool)>>::new(), Vec::new());
+        let (mut strata, mut doses) = (BTreeMap::<Option<Unit>, Vec<(f64, f64)>>::new(), Vec::new());
         let first = blocks[0].1;
         for (dose, block) in blocks {
-            let values: Vec<(usize, bool)> =
-                block.rows().filter_map(|row| Some((row, column.get(row)? == 1))).collect();
-            let successes = values.iter().filter(|(_, success)| *success).count() as u64;
-            let experiment = block.experiment.to_owned();
-            doses.push(Dose { dose: *dose, experiment, successes, n: values.len() as u64 });
-            for (row, success) in values {
+            let (successes, n) = block.moments(column).counts().unwrap_or_default();
+            let unit_mean = block.repeats.then(|| study.mean(block, column)).flatten();
+            doses.push(Dose { dose: *dose, experiment: block.experiment.to_owned(), successes, n, unit_mean });
+            for (unit, moments) in study.by_unit(block, |row| column.get(row)) {
                 // Episodes without a shared unit form one stratum.
-                let unit = Some(study.unit(row)).filter(|unit| !matches!(unit, Unit::Episode(_)));
-                strata.entry(unit).or_default().push((*dose, success));
+                let unit = Some(unit).filter(|unit| !matches!(unit, Unit::Episode(_)));
+                strata.entry(unit).or_default().extend(moments.mean().map(|mean| (*dose, mean)));
             }
         }
-        let incomparable = blocks.iter().find_map(|(_, block)| study.incomparable(first, block));
+        let incomparable = blocks.iter().find_map(|(_, block)| {
+            study.incomparable(first, block).or_else(|| selection(study, column, [first, block]))
+        });
         let strata: Vec<_> = strata.into_values().collect();
         Self {
             factor: name.to_owned(),
@@ -115,7 +119,6 @@ impl TrendRow {
     }
 }
 
-/// Blocks by model and condition, each with its dose.
 type Blocks<'s, 'a> = BTreeMap<(&'a str, Option<&'a str>), Vec<(f64, &'s Block<'a>)>>;
 
 /// The blocks of each model and condition, ascending by dose.

@@ -4,20 +4,23 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::statistics::comparisons::compare::in_unit;
+use crate::statistics::comparisons::matching::Units;
 use crate::statistics::episodes::Replies;
 use crate::study::{Block, RowKey, Study};
 use mirrorstats_exact::moments::Moments;
+use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::{Kind, Metric, StandardError};
-use mirrorstats_score::cells::group::membership;
 use mirrorstats_score::cells::interval::{bounded, cell_interval};
 use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{CONDITION, MetricColumn};
+use mirrorstats_statistics::comparisons::units::mean;
 use mirrorstats_statistics::design::Cluster;
 use mirrorstats_statistics::intervals::bootstrap;
 use mirrorstats_statistics::intervals::clustered::{Clustered, clustered, clustered_rate};
 use mirrorstats_statistics::intervals::coverage::{self, Withheld};
-use mirrorstats_statistics::intervals::interval::{Interval, clopper_pearson, jeffreys, wilson};
+use mirrorstats_statistics::intervals::interval::{Interval, clopper_pearson, jeffreys, wilson, wilson_of_units};
 
 /// Conditional metrics with fewer defined episodes are marked.
 pub(crate) const FEW: u64 = 5;
@@ -36,11 +39,17 @@ pub struct CellRow {
     /// Those in which the metric is defined: the denominator.
     pub n: u64,
     /// The sum of the values; for a rate, the successes.
-    pub sum: i128,
+    pub sum: Decimal,
     /// The arithmetic mean.
     pub mean: Option<f64>,
     /// The standard error that the definition asks for.
     pub se: Option<f64>,
+    /// The scenes, seeds or participants where some have several episodes; the intervals of a rate count each once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// The mean over these units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_mean: Option<f64>,
     /// The intervals that fit the kind.
     pub intervals: Intervals,
     /// True if a conditional metric rests on fewer than five episodes here.
@@ -101,30 +110,40 @@ impl CellRow {
         })
     }
 
-    /// All cells, by group and metric.
     pub(crate) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
         let mut rows = vec![Vec::new(); cells.groups.len()];
-        let members = membership(study.table, &cells.by).expect("the cells are grouped by columns of this table");
+        let members = cells.membership(study.table).expect("the cells are grouped by columns of this table");
         members.into_iter().zip(0..).for_each(|(group, row)| rows[group].push(row));
         let groups = cells.groups.iter().zip(&rows);
         groups.flat_map(|(group, rows)| Self::of_group(study, cells, group, rows, confidence)).collect()
     }
 
     fn of_group(study: &Study, cells: &Cells, group: &Group, rows: &[usize], confidence: f64) -> Vec<Self> {
+        let has_repeats = study.has_repeats(rows.iter().copied());
         let key: IndexMap<String, KeyValue> = cells.by.iter().cloned().zip(group.key.iter().cloned()).collect();
         let of_metric = |(metric, moments)| {
             let moments: &Moments = moments;
             let metric: &String = metric;
             let kind = study.kind(metric);
             let definition = study.metric(metric);
-            let se = definition.map_or(StandardError::Sample, |definition| definition.se);
+            let value = |row: usize| study.column(metric)?.get(row);
+            let units: Option<Vec<Moments>> =
+                has_repeats.then(|| study.units_of(rows.iter().copied(), value).into_values().collect());
+            let unit_mean = units.as_deref().and_then(mean);
+            let units = units.map(|units| units.len());
             let intervals = match (definition, kind, moments.counts()) {
+                (_, Kind::Rate, Some(_)) if has_repeats => Intervals::Rate {
+                    wilson: unit_mean.zip(units).and_then(|(mean, n)| wilson_of_units(mean, n, confidence)),
+                    clopper_pearson: None,
+                    jeffreys: None,
+                },
                 (_, Kind::Rate, Some((k, n))) => Intervals::Rate {
                     wilson: wilson(k, n, confidence),
                     clopper_pearson: clopper_pearson(k, n, confidence),
                     jeffreys: jeffreys(k, n, confidence),
                 },
-                (None, ..) => Intervals::NONE,
+                (None, ..) => Intervals::withheld(Withheld::Undefined),
+                (Some(_), ..) if has_repeats => Intervals::withheld(Withheld::Dependent),
                 (Some(definition), ..) => Intervals::quantity(study, (metric, definition), moments, rows, confidence),
             };
             Self {
@@ -133,9 +152,15 @@ impl CellRow {
                 kind,
                 episodes: group.episodes,
                 n: moments.n,
-                sum: moments.sum,
-                mean: moments.mean(),
-                se: moments.se(se),
+                sum: definition.map_or_else(|| Decimal::of_units(moments.sum, 0), |metric| metric.sums(moments)[0]),
+                mean: definition.map_or_else(|| moments.mean(), |metric| metric.mean(moments)),
+                se: definition.and_then(|metric| metric.standard_error(moments)),
+                units: units.map(|n| Units {
+                    n: n as u64,
+                    name: study.name_of_unit(rows.first().copied()).to_owned(),
+                    too_few: false,
+                }),
+                unit_mean: unit_mean.zip(definition).map(|(mean, metric)| metric.in_unit(mean)),
                 intervals,
                 few: moments.n < FEW && definition.is_some_and(|definition| definition.when.is_some()),
                 lost: None,
@@ -147,13 +172,14 @@ impl CellRow {
 }
 
 impl Intervals {
-    /// For a metric that the catalog does not describe.
-    const NONE: Self = Self::Quantity {
-        student_t: None,
-        student_t_withheld: Some(Withheld::Undefined),
-        bootstrap: None,
-        bootstrap_withheld: Some(Withheld::Undefined),
-    };
+    const fn withheld(why: Withheld) -> Self {
+        Self::Quantity {
+            student_t: None,
+            student_t_withheld: Some(why),
+            bootstrap: None,
+            bootstrap_withheld: Some(why),
+        }
+    }
 
     fn quantity(
         study: &Study,
@@ -172,6 +198,7 @@ impl Intervals {
             .flatten();
         let (student_t, student_t_withheld) = cell_interval(moments, metric, range, confidence);
         let (bootstrap, bootstrap_withheld) = bounded(resampled, moments, range, coverage::BOOTSTRAP);
+        let [student_t, bootstrap] = [student_t, bootstrap].map(|found| found.map(|found| in_unit(found, metric)));
         Self::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld }
     }
 }
@@ -218,14 +245,16 @@ impl ClusterRow {
         let interval = found.and_then(|found| found.interval).map(|interval| interval.within(range.low, range.high));
         let (interval, withheld) =
             coverage::given(interval, seeds.len() as u64, coverage::CLUSTERS, found.is_some_and(|it| it.se > 0.0));
+        let metric = &study.table.catalog.metric[&column.name];
+        let interval = interval.map(|interval| in_unit(interval, metric));
         Self {
             key: block.key(),
             metric: column.name.clone(),
             n: whole.n,
             seeds: seeds.len(),
-            mean: whole.mean(),
-            se: whole.se(StandardError::Sample),
-            by_seed: found.map(|found| Clustered { interval, ..found }),
+            mean: metric.mean(&whole),
+            se: whole.se(StandardError::Sample).map(|se| metric.in_unit(se)),
+            by_seed: found.map(|found| Clustered { interval, se: metric.in_unit(found.se), ..found }),
             withheld,
         }
     }

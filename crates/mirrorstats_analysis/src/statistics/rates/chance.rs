@@ -8,15 +8,15 @@ use std::cmp::Ordering;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::matching::{Units, too_few};
+use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::comparisons::matching::{Units, too_few};
 use crate::study::{Block, Experiment, RowKey, Study};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::chance::{exact_test, least_p};
 use mirrorstats_statistics::comparisons::holm::level;
-use mirrorstats_statistics::comparisons::units::rate_test;
+use mirrorstats_statistics::comparisons::units::{mean, rate_test};
 
 /// One rate against one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,10 +29,16 @@ pub struct ChanceRow {
     pub role: Role,
     /// The level.
     pub level: Ratio,
+    /// The blind strategy that reaches the level, where the experiment declares several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strategy: Option<String>,
     /// The successes.
     pub successes: u64,
     /// The episodes in which the metric is defined.
     pub n: u64,
+    /// The mean over units, each counted once, as in the test; null if each episode is its own unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_mean: Option<f64>,
     /// The exact p value, two-sided by minimum likelihood.
     pub p: f64,
     /// The mid-p value, which is not guaranteed to keep the level.
@@ -81,13 +87,12 @@ pub enum Verdict {
 }
 
 impl ChanceRow {
-    /// Every rate against every level of its experiment.
     pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
         for experiment in &study.experiments {
             for column in study.rates() {
                 for level in levels(study, experiment.name, &column.name) {
-                    rows.extend(Self::family(study, experiment, column, level, confidence));
+                    rows.extend(Self::family(study, experiment, column, &level, confidence));
                 }
             }
         }
@@ -98,17 +103,19 @@ impl ChanceRow {
         study: &Study,
         experiment: &Experiment,
         column: &MetricColumn,
-        (role, chance): (Role, Ratio),
+        level: &Level,
         confidence: f64,
     ) -> Vec<Self> {
-        let of = |block: &Block| Self::of(study, block, column, (role, chance), confidence);
+        let chance = level.rate;
+        let of = |block: &Block| Self::of(study, block, column, level, confidence);
         let (seen, mut rows): (Vec<LossCase>, Vec<Self>) = experiment.blocks.iter().filter_map(of).unzip();
         let settled = settle(seen.into_iter().zip(rows.iter_mut().map(|row| &mut row.losses)), confidence);
         for (row, (p_adjusted, is_shown)) in rows.iter_mut().zip(settled) {
             let units = row.units.as_ref().map(|units| units.too_few);
             let too_few = units.unwrap_or_else(|| few_episodes(row.n, chance, confidence));
             row.p_adjusted = p_adjusted;
-            row.verdict = Verdict::of(row.successes, row.n, chance, is_shown && !too_few);
+            let order = row.estimate().total_cmp(&chance.value());
+            row.verdict = Verdict::by_order(order, is_shown && !too_few);
         }
         rows
     }
@@ -118,9 +125,10 @@ impl ChanceRow {
         study: &Study,
         block: &Block,
         column: &MetricColumn,
-        (role, chance): (Role, Ratio),
+        level: &Level,
         confidence: f64,
     ) -> Option<(LossCase, Self)> {
+        let chance = level.rate;
         let (successes, n) = block.moments(column).counts()?;
         let of_units: Option<Vec<Moments>> =
             block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
@@ -128,24 +136,32 @@ impl ChanceRow {
         let tested = |toward: Option<Toward>| {
             let Some(units) = &of_units else {
                 let (successes, n) = with_lost(toward).counts()?;
-                return Some((exact_test(successes, n, chance)?, least_p(n, chance)?));
+                return Some((
+                    with_lost(toward).mean().unwrap_or(0.0),
+                    exact_test(successes, n, chance)?,
+                    least_p(n, chance)?,
+                ));
             };
             let lost = toward.map_or_else(Vec::new, |toward| toward.units(block.lost));
-            let lost = lost.into_iter().map(|(one, _)| one);
-            rate_test(&units.iter().copied().chain(lost).collect::<Vec<_>>(), chance)
+            let units: Vec<Moments> = units.iter().copied().chain(lost.into_iter().map(|(one, _)| one)).collect();
+            let (test, least) = rate_test(&units, chance)?;
+            Some((mean(&units)?, test, least))
         };
-        let case = |toward| LossCase {
-            difference: with_lost(toward).mean().map(|mean| mean - chance.value()),
-            p: tested(toward).map(|(test, _)| test.p),
+        let case = |toward| {
+            let found = tested(toward);
+            let difference = found.map(|(mean, ..)| mean - chance.value());
+            LossCase { difference, p: found.map(|(_, test, _)| test.p) }
         };
-        let (test, least) = tested(None)?;
+        let (estimate, test, least) = tested(None)?;
         let row = Self {
             key: block.key(),
             metric: column.name.clone(),
-            role,
+            role: level.role,
             level: chance,
+            strategy: level.strategy.clone(),
             successes,
             n,
+            unit_mean: of_units.as_ref().map(|_| estimate),
             p: test.p,
             mid_p: test.mid_p,
             p_adjusted: test.p,
@@ -154,6 +170,11 @@ impl ChanceRow {
             losses: LossCases::of(block.lost, |toward| case(Some(toward))),
         };
         Some((case(None), row))
+    }
+
+    /// The rate that is compared with the level.
+    fn estimate(&self) -> f64 {
+        self.unit_mean.unwrap_or(self.successes as f64 / self.n as f64)
     }
 
     /// The units or episodes that are too few for a verdict, or the lost ones that decide it; otherwise `None`.
@@ -188,12 +209,6 @@ impl Verdict {
         }
     }
 
-    pub(crate) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
-        let seen = i128::from(successes) * i128::from(level.denominator());
-        let expected = i128::from(level.numerator()) * i128::from(n);
-        Self::by_order(seen.cmp(&expected), is_shown)
-    }
-
     pub(crate) fn by_order(order: Ordering, is_shown: bool) -> Self {
         match order {
             Ordering::Greater if is_shown => Self::Above,
@@ -203,7 +218,15 @@ impl Verdict {
     }
 }
 
-pub(crate) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+/// A level of an experiment's metric.
+#[derive(Clone, Debug)]
+pub(crate) struct Level {
+    pub role: Role,
+    pub rate: Ratio,
+    pub strategy: Option<String>,
+}
+
+pub(crate) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<Level> {
     let own = own_levels(study, experiment, metric);
     match study.relations.whole(metric) {
         Some(whole) if own.is_empty() => own_levels(study, experiment, whole),
@@ -211,10 +234,12 @@ pub(crate) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role
     }
 }
 
-pub(crate) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+pub(crate) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<Level> {
     let catalog = &study.table.catalog;
-    let chance = catalog.chance(experiment, metric).map(|level| (Role::Chance, level));
+    let chance = catalog.levels(experiment, metric).pop();
+    let chance = chance.map(|(strategy, level)| Level { role: Role::Chance, rate: level, strategy });
     let references = catalog.experiment.get(experiment).and_then(|known| known.reference.get(metric));
-    let references = references.into_iter().flatten().map(|&level| (Role::Reference, level));
+    let references =
+        references.into_iter().flatten().map(|&level| Level { role: Role::Reference, rate: level, strategy: None });
     chance.into_iter().chain(references).collect()
 }

@@ -77,8 +77,12 @@ pub(crate) fn horizon_of(study: &Study, experiment: &Experiment, column: &Metric
     common_horizon(&curves)
 }
 
-/// The restricted mean of one block.
+/// The mean up to the horizon, with each unit counted once.
 pub(crate) fn restricted(study: &Study, block: &Block, column: &MetricColumn, horizon: i64) -> Option<f64> {
+    if block.repeats {
+        let time = |row| decided(study, column, row).map(|end| end.steps.min(horizon));
+        return study.unit_mean(block, time);
+    }
     // Any confidence works: only the mean is used.
     Some(curve(study, block, column)?.restricted_mean(horizon, 0.5)?.mean)
 }
@@ -109,7 +113,7 @@ impl DurationRow {
         let n = endings.len() as u64;
         let curve = Survival::of(&endings);
         let restricted = curve.as_ref().zip(horizon).and_then(|(curve, at)| curve.restricted_mean(at, confidence));
-        let (restricted, withheld) = restricted.map(|found| held(found, n)).unzip();
+        let (restricted, withheld) = restricted.map(|found| held(found, n, block.repeats)).unzip();
         let median_interval = curve.as_ref().and_then(|curve| curve.median_interval(confidence));
         Self {
             key: block.key(),
@@ -118,24 +122,28 @@ impl DurationRow {
             finished,
             mean: block.moments(column).mean(),
             median: curve.as_ref().and_then(Survival::median),
-            median_interval: median_interval.filter(|_| n >= coverage::MEDIAN),
+            median_interval: median_interval.filter(|_| n >= coverage::MEDIAN && !block.repeats),
             restricted,
             withheld: withheld.flatten(),
-            correct: horizon.and_then(|at| CorrectRow::of(&endings, at, confidence)),
+            correct: horizon.and_then(|at| CorrectRow::of(&endings, at, block.repeats, confidence)),
         }
     }
 }
 
 impl CorrectRow {
-    fn of(endings: &[Ending], horizon: i64, confidence: f64) -> Option<Self> {
+    fn of(endings: &[Ending], horizon: i64, repeats: bool, confidence: f64) -> Option<Self> {
         let curve = Incidence::of(endings)?;
-        let (restricted, withheld) = held(curve.restricted_mean(horizon, confidence)?, curve.n());
+        let (restricted, withheld) = held(curve.restricted_mean(horizon, confidence)?, curve.n(), repeats);
         let [correct, wrong] = curve.shares(horizon);
         Some(Self { correct, wrong, median: curve.median(), restricted, withheld })
     }
 }
 
-fn held(found: RestrictedMean, n: u64) -> (RestrictedMean, Option<Withheld>) {
+/// The mean with its interval, which takes episodes as independent: repeats of a unit are not.
+fn held(found: RestrictedMean, n: u64, repeats: bool) -> (RestrictedMean, Option<Withheld>) {
+    if repeats {
+        return (RestrictedMean { interval: None, ..found }, Some(Withheld::Dependent));
+    }
     let (interval, withheld): (Option<Interval>, _) =
         coverage::given(found.interval, n, coverage::RESTRICTED_MEAN, found.interval.is_some());
     (RestrictedMean { interval, ..found }, withheld)

@@ -8,13 +8,15 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::durations::{decided, is_duration};
-use crate::statistics::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::matching::{Matched, Scenes, Sides, outcomes};
+use crate::statistics::comparisons::compare::selection;
+use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::comparisons::matching::{Matched, Scenes, Sides, outcomes};
+use crate::statistics::comparisons::models::{Family, PairTest};
+use crate::statistics::rates::durations::{decided, is_duration};
 use crate::study::{Block, Study};
 use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_score::tables::table::MetricColumn;
-use mirrorstats_statistics::comparisons::holm::level;
+use mirrorstats_statistics::comparisons::holm::{is_significant, level};
 use mirrorstats_statistics::comparisons::improvement::{Improvement, probability_of_improvement};
 use mirrorstats_statistics::comparisons::stratified::{Stratum, common_difference, exact, pooled};
 use mirrorstats_statistics::durations::competing::Outcome;
@@ -60,6 +62,12 @@ pub struct OverallRow {
     pub p_adjusted: Option<f64>,
     /// True if the adjusted value reaches the level of significance.
     pub separated: bool,
+    /// The experiments whose own difference points the other way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub opposite: Vec<String>,
+    /// True if one of them shows its difference by itself: then there is no verdict over all.
+    #[serde(default)]
+    pub is_crossed: bool,
     /// The test with the lost episodes of both sides; none if none was lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<LossCases>,
@@ -118,22 +126,27 @@ impl<'s, 'a> Couple<'s, 'a> {
     }
 
     fn rate(&self, study: &Study, column: &MetricColumn, confidence: f64) -> OverallRow {
+        let is_selected = self.strata.iter().any(|(a, b)| selection(study, column, [a, b]).is_some());
         let sides = Sides::of(study, column, &self.strata);
         let of = |toward: Option<Toward>| {
             let row = self.by_episodes(column, toward, confidence);
             let Some(sides) = &sides else { return row };
             let few = level(confidence).is_none_or(|level| sides.len() < fewest_clusters(level));
             let lost = toward.map_or_else(Vec::new, |toward| toward.units(self.lost()));
-            let p = sides.test(&lost).filter(|_| !few).map(|test| test.p);
-            OverallRow { method: OverallMethod::Units, interval: None, p, mid_p: None, ..row }
+            let test = sides.test(&lost);
+            let p = test.filter(|_| !few).map(|test| test.p);
+            let difference = test.map(|test| test.difference);
+            OverallRow { method: OverallMethod::Units, difference, interval: None, p, mid_p: None, ..row }
         };
         let case = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
         let row = of(None);
+        if is_selected {
+            return OverallRow { interval: None, p: None, mid_p: None, ..row };
+        }
         let losses = LossCases::of(self.lost(), |toward| case(&of(Some(toward)))).filter(|_| row.p.is_some());
         OverallRow { losses, ..row }
     }
 
-    /// The lost episodes of both sides.
     fn lost(&self) -> u64 {
         self.strata.iter().map(|(a, b)| a.lost + b.lost).sum()
     }
@@ -186,14 +199,14 @@ impl<'s, 'a> Couple<'s, 'a> {
     }
 }
 
-pub(crate) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<OverallRow> {
+pub(crate) fn rates(study: &Study, families: &[Family], metrics: &[String], confidence: f64) -> Vec<OverallRow> {
     let couples = Couple::all(study);
     let is_rate = |metric: &&String| study.kind(metric) == Kind::Rate;
     let mut all = Vec::new();
     for column in metrics.iter().filter(is_rate).filter_map(|metric| study.column(metric)) {
         let mut rows: Vec<OverallRow> = couples.iter().map(|it| it.rate(study, column, confidence)).collect();
         adjust(&mut rows, confidence);
-        all.extend(rows.into_iter().map(|row| row.better_first(study)));
+        all.extend(rows.into_iter().map(|row| row.better_first(study).within(families, confidence)));
     }
     all
 }
@@ -216,6 +229,23 @@ fn adjust(rows: &mut [OverallRow], confidence: f64) {
 }
 
 impl OverallRow {
+    /// Withholds the verdict if one experiment alone shows the opposite: a qualitative interaction (Gail and Simon
+    /// 1985), over which no difference is common to all. Both have the better model first.
+    fn within(self, families: &[Family], confidence: f64) -> Self {
+        let is_of = |family: &&Family| family.metric == self.metric && self.experiments.contains(&family.experiment);
+        let is_turned = |test: &PairTest| {
+            (&test.first, &test.second) == (&self.second, &self.first)
+                && test.comparison.difference.is_some_and(|difference| difference.abs() > 0.0)
+        };
+        let turned = |family: &'_ Family| {
+            Some((family.experiment.clone(), family.tests.iter().find(|it| is_turned(it))?.comparison.p))
+        };
+        let turned: Vec<(String, Option<f64>)> = families.iter().filter(is_of).filter_map(turned).collect();
+        let is_crossed = turned.iter().filter_map(|(_, p)| *p).any(|p| is_significant(p, confidence));
+        let opposite = turned.into_iter().map(|(experiment, _)| experiment).collect();
+        Self { separated: self.separated && !is_crossed, opposite, is_crossed, ..self }
+    }
+
     fn better_first(self, study: &Study) -> Self {
         let lower_is_better = study.better(&self.metric) == mirrorstats_metric::catalogs::catalog::Better::Lower;
         let is_worse = |difference: f64| if lower_is_better { difference > 0.0 } else { difference < 0.0 };

@@ -1,27 +1,33 @@
 //! Ranks that the tests leave open, instead of an order of means.
 //!
 //! Rule: a model ranks below another only if it is shown to be worse. Models that rank below no other are tied for the
-//! best. A family with incomparable models has no ranks.
+//! best. A family with incomparable models, or of a metric whose episodes the outcome selects, has no ranks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::statistics::comparisons::compare::Comparison;
+use crate::statistics::comparisons::matching::singular;
+use crate::statistics::comparisons::models::{Family, compared};
 use crate::statistics::conclusions::headline;
-use crate::statistics::models::{Family, compared};
-use crate::statistics::overall::{self, OverallRow};
-use crate::study::Study;
+use crate::statistics::episodes::first_named;
+use crate::statistics::rates::overall::{self, OverallRow};
+use crate::study::{Block, Study};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_exact::format::UNDEFINED;
+use mirrorstats_exact::format::{UNDEFINED, fixed};
 use mirrorstats_exact::moments::MomentOverflow;
+use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_score::cells::interval::CONFIDENCE;
 use mirrorstats_score::tables::lost_counts::LostCounts;
-use mirrorstats_score::tables::table::EpisodeTable;
+use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
 use mirrorstats_statistics::design::Design;
 use mirrorstats_tables::{Column, ListTable, Look, Table, text_field};
 
-/// The name of all experiments together.
+/// The most rates that a note names.
+const MOST_NAMED: usize = 6;
+
 pub(crate) const ALL: &str = "all";
 const SENTENCE: &str = "The ranks that the tests leave open, adjusted by Holm within each experiment and metric. Models that may have \
                         rank 1 are tied for the best.";
@@ -49,7 +55,8 @@ impl RankRow {
             let shown: Vec<(&str, &str)> = separated.map(|test| (&*test.first, &*test.second)).collect();
             ranks(Some(&family.experiment), &family.metric, &models, &shown)
         };
-        let families = families.iter().filter(|family| family.comparisons().all(|it| it.incomparable.is_none()));
+        let is_open = |it: &Comparison| it.incomparable.is_none() && it.selected.is_none();
+        let families = families.iter().filter(|family| family.comparisons().all(is_open));
         let mut rows: Vec<Self> = families.flat_map(of_family).collect();
         for rows_of in overall.chunk_by(|a, b| a.metric == b.metric) {
             let models: BTreeSet<&str> = rows_of.iter().flat_map(|row| [&*row.first, &*row.second]).collect();
@@ -88,10 +95,34 @@ impl Ranks {
         design: Design,
         pool: bool,
     ) -> Result<Self, MomentOverflow> {
-        let mut study = Study::from_table(table, design, Some(lost))?;
+        let mut study = Study::from_table(table, design, Some(lost), None)?;
         study.pool = pool;
-        let overall = overall::rates(&study, &headline(&study), CONFIDENCE);
-        Ok(Self(RankRow::all(&compared(&study, CONFIDENCE).0, &overall)))
+        let (families, _) = compared(&study, CONFIDENCE);
+        let overall = overall::rates(&study, &families, &headline(&study), CONFIDENCE);
+        Ok(Self(RankRow::all(&families, &overall)))
+    }
+
+    /// The headline rates whose mean over scenes, seeds or participants is not that over episodes; `None` without any.
+    pub fn unit_means(table: &EpisodeTable, design: Design) -> Result<Option<String>, MomentOverflow> {
+        let study = Study::from_table(table, design, None, None)?;
+        let columns: Vec<&MetricColumn> = headline(&study).iter().filter_map(|metric| study.column(metric)).collect();
+        let rates = || columns.iter().filter(|column| study.kind(&column.name) == Kind::Rate);
+        let of_block = |block: &Block| {
+            let unit = singular(study.unit_name(block));
+            let name = format!("{} {}", block.experiment, block.name());
+            let differing = |column: &&&MetricColumn| {
+                let [by_unit, pooled] = [study.mean(block, column)?, block.moments(column).mean()?];
+                let means = [by_unit, pooled].map(|mean| fixed(Some(mean), 3));
+                let [mean, pooled] = (means[0] != means[1]).then_some(means)?;
+                Some(format!("{name} {} {mean} by {unit}, {pooled} by episode", column.name))
+            };
+            rates().filter_map(|column| differing(&column)).collect::<Vec<_>>()
+        };
+        let repeated = study.blocks().filter(|block| block.repeats);
+        let found: Vec<String> = repeated.flat_map(of_block).collect();
+        let about =
+            "Tests and ranks count each scene, seed or participant once; the means of this table count episodes";
+        Ok((!found.is_empty()).then(|| format!("{about}: {}.", first_named(found.into_iter(), MOST_NAMED))))
     }
 
     /// Returns true if a model is tied for the best, and some other model is not.

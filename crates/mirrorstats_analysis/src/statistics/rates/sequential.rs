@@ -8,11 +8,13 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::chance::{Role, Verdict, levels};
+use crate::statistics::comparisons::compare::selection;
+use crate::statistics::comparisons::models::by_mean;
 use crate::statistics::conclusions::headline;
+use crate::statistics::design_audit::{DesignAudit, Touched};
 use crate::statistics::episodes::Selection;
-use crate::statistics::models::by_mean;
 use crate::statistics::options::Options;
+use crate::statistics::rates::chance::{Level, Role, Verdict, levels};
 use crate::study::{Block, Experiment, RowKey, Study, Unit};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_exact::ratio::Ratio;
@@ -43,6 +45,15 @@ pub struct Sequential {
     /// Settings that differ within a cell or between models that are compared, and were declared not to matter.
     #[serde(default)]
     pub pooled: Vec<String>,
+    /// The settings that keep models from being compared, each with the number of pairs.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub not_comparable: BTreeMap<String, usize>,
+    /// The design audit, as of the statistics at a fixed number of episodes.
+    #[serde(default)]
+    pub audit: DesignAudit,
+    /// The caveats of every verdict: the filter, pooling, and the findings of the audit about levels and models.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub caveats: Vec<String>,
     /// The rates that have a level to be compared with.
     pub headline: Vec<String>,
     /// Every rate of every model.
@@ -81,6 +92,9 @@ pub struct SequentialChance {
     pub role: Role,
     /// The level.
     pub level: Ratio,
+    /// The blind strategy that reaches the level, where the experiment declares several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strategy: Option<String>,
     /// The successes.
     pub successes: u64,
     /// The episodes in which the metric is defined.
@@ -128,9 +142,14 @@ impl Sequential {
     /// The statistics of `table`, the episodes so far. For a confidence outside (0, 1), sequences and verdicts are
     /// undefined.
     pub fn from_table(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
-        let mut study = Study::from_table(table, options.design, None)?;
+        let mut study = Study::from_table(table, options.design, None, None)?;
         study.pool = options.pooled.is_some();
         let rates = SequentialRate::all(&study, options.confidence);
+        let audit = DesignAudit::of(&study, options);
+        let pooled = options.pooled_in(&study);
+        let mut caveats = audit.caveats(Touched::Levels, options, !pooled.is_empty());
+        let of_models = audit.phrases(Touched::Models).filter(|phrase| !caveats.contains(phrase)).cloned();
+        caveats.extend(of_models.collect::<Vec<_>>());
         Ok(Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
@@ -138,13 +157,27 @@ impl Sequential {
             episodes: table.len(),
             selection: options.selection.clone(),
             departures: None,
-            pooled: options.pooled_in(&study),
+            pooled,
+            not_comparable: not_comparable(&study),
+            audit,
+            caveats,
             headline: headline_rates(&study),
             chance: SequentialChance::all(&study, &rates, options.confidence),
             models: SequentialPair::all(&study, options.confidence),
             rates,
         })
     }
+}
+
+fn not_comparable(study: &Study) -> BTreeMap<String, usize> {
+    let mut found = BTreeMap::new();
+    for experiment in &study.experiments {
+        for (at, first) in experiment.blocks.iter().enumerate() {
+            let settings = experiment.blocks[at + 1..].iter().filter_map(|second| study.incomparable(first, second));
+            settings.for_each(|setting| *found.entry(setting).or_default() += 1);
+        }
+    }
+    found
 }
 
 fn headline_rates(study: &Study) -> Vec<String> {
@@ -178,27 +211,31 @@ impl SequentialRate {
 }
 
 impl SequentialChance {
-    /// Every rate against every level of its experiment.
     fn all(study: &Study, rates: &[SequentialRate], confidence: f64) -> Vec<Self> {
         let is_same =
             |a: &SequentialRate, b: &SequentialRate| a.key.experiment == b.key.experiment && a.metric == b.metric;
         let families = rates.chunk_by(is_same).flat_map(|rates| {
             let levels = levels(study, &rates[0].key.experiment, &rates[0].metric);
-            levels.into_iter().map(move |level| Self::family(rates, level, confidence))
+            levels.into_iter().map(move |level| Self::family(rates, &level, confidence))
         });
         families.flatten().collect()
     }
 
-    fn family(rates: &[SequentialRate], (role, chance): (Role, Ratio), confidence: f64) -> Vec<Self> {
+    fn family(rates: &[SequentialRate], level: &Level, confidence: f64) -> Vec<Self> {
+        let chance = level.rate;
         let evidence = |rate: &SequentialRate| Some((rate.clone(), against_level(rate.successes, rate.n, chance)?));
         let tested: Vec<_> = rates.iter().filter_map(evidence).collect();
         let adjusted = holm(&tested.iter().map(|(_, found)| found.p).collect::<Vec<_>>());
         let rows = tested.into_iter().zip(adjusted).map(|((rate, found), p_adjusted)| Self {
-            verdict: Verdict::of(rate.successes, rate.n, chance, is_significant(p_adjusted, confidence)),
+            verdict: Verdict::by_order(
+                rate.rate.unwrap_or_default().total_cmp(&chance.value()),
+                is_significant(p_adjusted, confidence),
+            ),
             key: rate.key,
             metric: rate.metric,
-            role,
+            role: level.role,
             level: chance,
+            strategy: level.strategy.clone(),
             successes: rate.successes,
             n: rate.n,
             e: found.e,
@@ -217,13 +254,19 @@ impl SequentialPair {
 
     fn family(study: &Study, experiment: &Experiment, column: &MetricColumn, confidence: f64) -> Vec<Self> {
         let mut blocks: Vec<&Block> = experiment.blocks.iter().collect();
-        let mean = |block: &Block| block.moments(column).mean();
+        // The same episodes as the pairs: the first of each unit.
+        let mean = |block: &Block| {
+            let firsts = study.firsts(block, column);
+            let sum: i64 = firsts.iter().map(|(_, value)| *value).sum();
+            (!firsts.is_empty()).then(|| sum as f64 / firsts.len() as f64)
+        };
         blocks.sort_by(|a, b| by_mean(mean(a), mean(b), study.better(&column.name)));
         let firsts: Vec<_> = blocks.iter().map(|block| (*block, study.firsts(block, column))).collect();
         let mut tested = Vec::new();
         for (at, (first, here)) in firsts.iter().enumerate() {
             for (second, there) in &firsts[at + 1..] {
-                if study.incomparable(first, second).is_none() {
+                let is_selected = selection(study, column, [first, second]).is_some();
+                if !is_selected && study.incomparable(first, second).is_none() {
                     let (pairs, shared) = matched(here, there);
                     tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
                 }

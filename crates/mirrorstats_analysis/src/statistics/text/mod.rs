@@ -7,12 +7,13 @@ pub mod sequential;
 mod tables;
 mod text_table;
 
-use super::{Answer, FEW, Selection, Statistics};
+pub(crate) use self::tables::beside;
+
+use super::{Answer, DesignAudit, FEW, Family, Selection, Statistics};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_tables::{Table, push_wrapped};
 
-/// The amount of printed detail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Length {
     /// The answers and the numbers behind them.
@@ -35,6 +36,7 @@ impl Statistics {
         );
         episodes(&mut text, statistics.selection.as_ref(), &statistics.pooled, width);
         push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
+        audit(&mut text, &statistics.audit, width);
         departures(&mut text, statistics.departures.as_deref(), width);
         list(&mut text, &heading(statistics), &answers(&statistics.answers), width);
         if length == Length::Full {
@@ -60,6 +62,15 @@ impl Statistics {
     }
 }
 
+impl DesignAudit {
+    /// The cells as a table, then the findings, in lines of at most `width` columns.
+    pub fn render(&self, width: Option<usize>) -> String {
+        let mut text = tables::design(self).within(width) + "\n";
+        audit(&mut text, self, width);
+        text
+    }
+}
+
 fn answers(answers: &[Answer]) -> Vec<String> {
     let line = |answer: &Answer| {
         let caveats = answer.caveats.join("; ");
@@ -74,6 +85,18 @@ fn episodes(text: &mut String, selection: Option<&Selection>, pooled: &[String],
     let pooled = pooled.iter().map(|sentence| visible(sentence));
     let sentences = selection.map(Selection::sentence).into_iter().chain(pooled);
     sentences.for_each(|sentence| push_wrapped(text, &sentence, width, 0));
+}
+
+fn audit(text: &mut String, audit: &DesignAudit, width: Option<usize>) {
+    if audit.findings.is_empty() {
+        push_wrapped(
+            text,
+            &format!("Design audit: nothing found in {}.", counted(audit.cells.len() as u64, "cell")),
+            width,
+            0,
+        );
+    }
+    list(text, "Design audit", &audit.sentences(), width);
 }
 
 fn departures(text: &mut String, found: Option<&[String]>, width: Option<usize>) {
@@ -104,9 +127,12 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
     let mid_p = if is_full { "; mid-p need not keep the level" } else { "" };
     let title = "Against chance: exact binomial test, two-sided by minimum likelihood; Holm over the models";
     add(format!("{title}{mid_p}"), tables::chance(statistics, shown, is_full));
+    let is_permuted = statistics.models.iter().flat_map(Family::comparisons).any(|found| found.p_error.is_some());
+    let by_permutation = if is_permuted { ", also by permutation at unequal n" } else { "" };
     let title = format!(
         "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
-         episodes), t tests of restricted means; Holm over all pairs; {percent} intervals (Newcombe) not adjusted"
+         episodes), t tests of restricted means{by_permutation}; Holm over all pairs; {percent} intervals (Newcombe) not \
+         adjusted"
     );
     add(title, tables::separated(statistics, shown, is_full));
     let title = format!(

@@ -3,20 +3,15 @@
 //! Rule: texts that depend on the order of the two models are stored for both orders, so that nothing is recomputed.
 
 use super::super::{Comparison, Statistics};
-use super::tables::{held, method, overall_method};
+use super::tables::{RATE_PLACES, beside, held, method, overall_method};
 use mirrorstats_exact::format::{UNDEFINED, fixed, p_value};
 use mirrorstats_statistics::intervals::interval::Interval;
 
-/// Decimals of a difference of rates.
-const RATE_PLACES: usize = 3;
-
-/// One model against another, as texts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PairText<'a> {
     /// The model with the better mean.
     pub first: &'a str,
     pub second: &'a str,
-    /// The name of the test.
     pub test: &'static str,
     /// Each text from the first and from the second model's view: the counts of a side, `11/21`, or `n = 21` for a
     /// duration; the discordant pairs in favour of this side, of the other, and all, `2 : 6 of 21`; one side minus the
@@ -33,7 +28,6 @@ pub struct PairText<'a> {
 pub struct FamilyText<'a> {
     pub experiment: Option<&'a str>,
     pub metric: &'a str,
-    /// All pairs of models.
     pub tests: Vec<PairText<'a>>,
 }
 
@@ -83,10 +77,13 @@ fn undefined() -> [String; 2] {
 
 fn counts(found: &Comparison) -> [String; 2] {
     let [m, n] = found.n;
-    match found.successes {
+    let [first, second] = match found.successes {
         Some([k, l]) => [format!("{k}/{m}"), format!("{l}/{n}")],
         None => [format!("n = {m}"), format!("n = {n}")],
-    }
+    };
+    let [a, b] = found.unit_means.map_or([None; 2], |means| means.map(Some));
+    let places = method(found.method).1;
+    [beside(&first, a, places), beside(&second, b, places)]
 }
 
 fn differing(found: &Comparison) -> [String; 2] {

@@ -2,8 +2,9 @@
 
 use super::tables::{Shown, plain};
 use super::text_table::TextTable;
-use super::{departures, episodes, list, percent, section};
+use super::{audit, departures, episodes, list, percent, section};
 use crate::statistics::{Sequential, SequentialPair, Verdict};
+use mirrorstats_exact::chance::with_strategy;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, e_value, fixed};
 use mirrorstats_tables::{Table, push_wrapped};
@@ -32,7 +33,9 @@ impl Sequential {
         let mut text = String::new();
         push_wrapped(&mut text, &opening, width, 0);
         episodes(&mut text, sequential.selection.as_ref(), &sequential.pooled, width);
+        audit(&mut text, &sequential.audit, width);
         departures(&mut text, sequential.departures.as_deref(), width);
+        list(&mut text, "What every verdict leaves out", &sequential.caveats, width);
         list(&mut text, "What this is for", &PURPOSE.map(str::to_owned), width);
         let pairs: Vec<&SequentialPair> = sequential.models.iter().filter(|pair| shown(&pair.metric)).collect();
         for (title, table) in [
@@ -46,10 +49,20 @@ impl Sequential {
             section(&mut text, title, table, width);
         }
         let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated).count();
+        let apart = sequential.not_comparable.iter();
+        let apart: Vec<String> = apart
+            .map(|(setting, pairs)| format!("{} not comparable ({setting})", counted(*pairs as u64, "pair")))
+            .collect();
         let outcome = match pairs.len() {
+            0 if !apart.is_empty() => format!("No two models are compared: {}.", apart.join("; ")),
             0 => "No two models have episodes of one experiment: they are not compared.".to_owned(),
             1 => format!("{told_apart} of 1 pair of models is told apart so far."),
             all => format!("{told_apart} of {all} pairs of models are told apart so far."),
+        };
+        let outcome = match apart.as_slice() {
+            [] => outcome,
+            _ if pairs.is_empty() => outcome,
+            apart => format!("{outcome} {}.", apart.join("; ")),
         };
         text.push('\n');
         push_wrapped(&mut text, &outcome, width, 0);
@@ -61,7 +74,6 @@ impl Sequential {
     }
 }
 
-/// The purpose of this page and of the other one.
 const PURPOSE: [&str; 2] = [
     "A running study: look as often as you like, stop when you like; these intervals and verdicts keep their confidence.",
     "The price is width. Where the number of episodes was fixed beforehand, `stats` without --sequential shows more.",
@@ -79,7 +91,7 @@ fn rates(sequential: &Sequential, shown: Shown) -> Table {
 fn chance(sequential: &Sequential, shown: Shown) -> Table {
     TextTable::of(sequential.chance.iter().filter(|row| shown(&row.metric)))
         .cell(|row| (&row.key, &row.metric))
-        .text("level", |row| format!("{} {}", row.role.name(), row.level))
+        .text("level", |row| format!("{} {}", row.role.name(), with_strategy(row.level, row.strategy.as_deref())))
         .number("count", |row| format!("{}/{}", row.successes, row.n))
         .number("e", |row| e_value(row.e))
         .p_values(false, |row| [Some(row.p), None, Some(row.p_adjusted)])

@@ -1,12 +1,14 @@
 //! The tables of `stats`, one function each: one line per row of the statistics whose metric is shown.
 
 use super::text_table::TextTable;
-use crate::statistics::matching::singular;
-use crate::statistics::ranks::ALL;
+use crate::statistics::comparisons::matching::singular;
+use crate::statistics::rates::ranks::ALL;
 use crate::statistics::{
-    CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Sign, Statistics, Units, Verdict,
+    CellRow, Comparison, DesignAudit, Dose, Intervals, LossCases, Method, OverallMethod, Sign, Statistics, Units,
+    Verdict,
 };
 use crate::study::named;
+use mirrorstats_exact::chance::with_strategy;
 use mirrorstats_exact::format::{UNDEFINED, bounds, counted, fixed, p_value};
 use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_statistics::intervals::coverage::Withheld;
@@ -18,6 +20,8 @@ pub(super) type Shown<'a> = &'a dyn Fn(&str) -> bool;
 /// The mark of a conditional metric with few defined episodes.
 pub(super) const FEW_MARK: char = '†';
 
+pub(super) const RATE_PLACES: usize = 3;
+
 /// The verdict if no outcome of the few units, or of the lost episodes, could have given one.
 const CANNOT_SAY: &str = "cannot say";
 
@@ -27,9 +31,11 @@ pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Tab
         Intervals::Rate { wilson, clopper_pearson, jeffreys } => Some([wilson, clopper_pearson, jeffreys]),
         Intervals::Quantity { .. } => None,
     };
+    let has_units = statistics.cells.iter().any(|cell| cell.unit_mean.is_some());
     TextTable::of_cells(statistics, shown, of_rate)
-        .number("count", |(cell, _)| format!("{}/{}{}", cell.sum, cell.n, mark(cell)))
-        .number("rate", |(cell, _)| fixed(cell.mean, 3))
+        .number("count", |(cell, _)| format!("{}/{}{}{}", cell.sum, cell.n, mark(cell), of_units(cell.units.as_ref())))
+        .number("rate", |(cell, _)| fixed(cell.mean, RATE_PLACES))
+        .number_if(has_units, "by unit", |(cell, _)| fixed(cell.unit_mean, RATE_PLACES))
         .number("Wilson", |(_, found)| plain(found[0], 3))
         .number_if(is_full, "Clopper-Pearson", |(_, found)| plain(found[1], 3))
         .number_if(is_full, "Jeffreys", |(_, found)| plain(found[2], 3))
@@ -82,8 +88,11 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Ta
     let has_losses = statistics.chance.iter().any(|row| row.losses.is_some());
     TextTable::of(statistics.chance.iter().filter(|row| is_shown(&row.metric)))
         .cell(|row| (&row.key, &row.metric))
-        .text("level", |row| format!("{} {}", row.role.name(), row.level))
-        .number("count", |row| format!("{}/{}{}", row.successes, row.n, of_units(row.units.as_ref())))
+        .text("level", |row| format!("{} {}", row.role.name(), with_strategy(row.level, row.strategy.as_deref())))
+        .number("count", |row| {
+            let count = beside(&format!("{}/{}", row.successes, row.n), row.unit_mean, RATE_PLACES);
+            count + &of_units(row.units.as_ref())
+        })
         .p_values(is_full, |row| [Some(row.p), Some(row.mid_p), Some(row.p_adjusted)])
         .lost_if(has_losses, |row| row.losses.as_ref())
         .number("verdict", |row| match row.verdict {
@@ -93,7 +102,12 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Ta
         .table()
 }
 
-/// The number of units beside the episodes.
+/// A count of episodes, with the mean over units where the test uses that.
+pub(crate) fn beside(count: &str, unit_mean: Option<f64>, places: usize) -> String {
+    let mean = unit_mean.map(|mean| format!(" ({} by unit)", fixed(Some(mean), places)));
+    count.to_owned() + &mean.unwrap_or_default()
+}
+
 fn of_units(units: Option<&Units>) -> String {
     units.map_or_else(String::new, |units| format!(" in {}", units.counted()))
 }
@@ -113,7 +127,8 @@ impl<R> TextTable<R> {
         of: impl Fn(&R) -> &Comparison,
     ) -> Self {
         let has_losses = all.clone().any(|found| found.losses.is_some());
-        let has_repeats = all.any(|found| found.repeat_se.is_some());
+        let has_repeats = all.clone().any(|found| found.repeat_se.is_some());
+        let is_permuted = is_full && all.any(|found| found.p_error.is_some());
         let places = |row: &R| method(of(row).method).1;
         self.text("test", |row| method(of(row).method).0)
             .number("counts", |row| counts(of(row)))
@@ -121,6 +136,7 @@ impl<R> TextTable<R> {
             .number("interval", |row| held(of(row).interval, of(row).withheld, places(row)))
             .number_if(has_repeats, "SE of repeats", |row| fixed(of(row).repeat_se, places(row)))
             .p_values(is_full, |row| [of(row).p, of(row).mid_p, of(row).p_adjusted])
+            .number_if(is_permuted, "Monte Carlo error of p", |row| fixed(of(row).p_error, 4))
             .lost_if(has_losses, |row| of(row).losses.as_ref())
     }
 }
@@ -149,6 +165,7 @@ pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -
             Some(Sign::Lower) => "lower",
             None if contrast.comparison.unsaid(statistics.confidence).is_some() => CANNOT_SAY,
             None if contrast.comparison.p.is_some() => "not told apart",
+            None if contrast.comparison.selected.is_some() => "descriptive",
             None => UNDEFINED,
         })
         .table()
@@ -160,7 +177,8 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
         .text("metric", |row| row.metric.clone())
         .text("model", |row| named(&row.model, row.condition.as_deref()))
         .text("rates by dose", |row| {
-            let rates = row.doses.iter().map(|dose| format!("{}: {}/{}", dose.dose, dose.successes, dose.n));
+            let count = |dose: &Dose| format!("{}: {}/{}", dose.dose, dose.successes, dose.n);
+            let rates = row.doses.iter().map(|dose| beside(&count(dose), dose.unit_mean, RATE_PLACES));
             rates.collect::<Vec<_>>().join(", ")
         })
         .number("compared within", |row| {
@@ -180,9 +198,16 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
 
 fn counts(found: &Comparison) -> String {
     let [m, n] = found.n;
-    let counts = match (found.pairs, found.successes) {
+    let places = method(found.method).1;
+    let sides = |counts: [String; 2]| {
+        let [first, second] = counts;
+        let [a, b] = found.unit_means.map_or([None; 2], |means| means.map(Some));
+        format!("{}, {}", beside(&first, a, places), beside(&second, b, places))
+    };
+    let counts = match (found.pairs.filter(|_| found.unit_means.is_none()), found.successes) {
         (Some(pairs), _) => format!("{}:{} of {}", pairs.first_only, pairs.second_only, counted(m, "pair")),
-        (None, Some([k, l])) => format!("{k}/{m}, {l}/{n}"),
+        (None, Some([k, l])) => sides([format!("{k}/{m}"), format!("{l}/{n}")]),
+        _ if found.unit_means.is_some() => sides([m.to_string(), n.to_string()]),
         _ if matches!(found.method, Method::RestrictedMeanPaired | Method::StudentPaired) => counted(m, "pair"),
         _ => format!("{m}, {n}"),
     };
@@ -225,8 +250,28 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
         .lost_if(has_losses, |row| row.losses.as_ref())
         .number("verdict", |row| match row.losses {
             _ if row.separated => "better",
+            _ if row.is_crossed => "opposite effects",
             Some(losses) if !losses.agree => CANNOT_SAY,
             _ => "not told apart",
+        })
+        .table()
+}
+
+pub(super) fn design(audit: &DesignAudit) -> Table {
+    TextTable::of(&audit.cells)
+        .text("experiment", |cell| cell.key.experiment.clone())
+        .text("model", |cell| cell.key.name())
+        .number("episodes", |cell| cell.episodes)
+        .number("lost", |cell| cell.lost)
+        .number("seeds", |cell| cell.seeds)
+        .number("scenes", |cell| cell.scenes)
+        .number("shared", |cell| cell.shared_scenes)
+        .number("most repeats", |cell| cell.most_repeats)
+        .number("unfinished", |cell| cell.unfinished.map_or_else(|| UNDEFINED.to_owned(), |count| count.to_string()))
+        .number("after steps", |cell| match cell.unfinished_steps {
+            None => UNDEFINED.to_owned(),
+            Some([first, last]) if first == last => first.to_string(),
+            Some([first, last]) => format!("{first} to {last}"),
         })
         .table()
 }
@@ -300,9 +345,7 @@ pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Table {
 
 pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
     TextTable::of(statistics.retests.iter().filter(|row| shown(&row.metric)))
-        .text("experiment", |row| row.experiment.clone())
-        .text("model", |row| named(&row.model, row.condition.as_deref()))
-        .text("metric", |row| row.metric.clone())
+        .cell(|row| (&row.key, &row.metric))
         .number("scenes", |row| row.scenes)
         .number("episodes", |row| row.episodes)
         .number("not always the same", |row| format!("{}/{}", row.unstable, row.scenes))
@@ -334,6 +377,8 @@ pub(super) fn held(interval: Option<Interval>, withheld: Option<Withheld>, place
     match (interval, withheld) {
         (None, Some(Withheld::TooFew { fewest })) => format!("{UNDEFINED} (n < {fewest})"),
         (None, Some(Withheld::NoSpread)) => format!("{UNDEFINED} (no spread)"),
+        (None, Some(Withheld::Selected)) => format!("{UNDEFINED} (selected)"),
+        (None, Some(Withheld::Dependent)) => format!("{UNDEFINED} (repeats)"),
         (None, Some(Withheld::Incomparable)) => format!("{UNDEFINED} (not comparable)"),
         _ => plain(interval, places),
     }

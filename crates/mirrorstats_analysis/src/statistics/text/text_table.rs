@@ -32,7 +32,6 @@ impl<R> TextTable<R> {
         if is_shown { self.number(heading, cell) } else { self }
     }
 
-    /// The columns of the experiment, the model and the metric.
     pub fn cell(self, of: impl Fn(&R) -> (&RowKey, &String)) -> Self {
         self.text("experiment", |row| of(row).0.experiment.clone())
             .text("model", |row| of(row).0.name())

@@ -13,13 +13,13 @@ use std::path::{Path, PathBuf};
 use rustix::fs::{self as system, Access, AtFlags, CWD, RenameFlags, StatxAttributes, StatxFlags};
 
 use super::super::place::{folder_of, sync_folder};
-use super::stage::{FolderFiles, Stage, old_files, step};
+use super::stage::{FolderFiles, old_files, stage, step, write};
 
 /// Replaces the files of the existing folder `out`. The inner result says whether the new names are on the disk.
 pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Result<()>> {
     check(out)?;
-    let stage = Stage::beside(out)?;
-    stage.write(files, out).map_err(|error| error.source)?;
+    let stage = stage(folder_of(out), out)?;
+    write(stage.path(), files, out).map_err(|error| error.source)?;
     link_others(out, stage.path(), files)?;
     make_alike(&fs::symlink_metadata(out)?, stage.path())?;
     sync_folder(stage.path())?;

@@ -7,14 +7,13 @@ use std::path::{Path, PathBuf};
 
 use super::super::new_file::replace as replace_bytes;
 use super::super::place::{folder_of, sync_folder};
-use super::stage::{FolderError, FolderFiles, NOTE, Stage, old_files, step, sync_folders};
+use super::stage::{FolderError, FolderFiles, NOTE, old_files, stage, step, sync_folders, write};
 
-/// Replaces the files of the existing folder `out`.
 pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
     let _lock = lock(out).map_err(FolderError::at(out))?;
     // Inside the folder, which may be a separate volume.
-    let stage = Stage::create(out, files.index.unwrap_or(out)).map_err(FolderError::at(out))?;
-    stage.write(files, out)?;
+    let stage = stage(out, files.index.unwrap_or(out)).map_err(FolderError::at(out))?;
+    write(stage.path(), files, out)?;
     let old = old_files(out, files);
     note(out, &old, files).map_err(FolderError::at(out))?;
     files.index.map_or(Ok(()), |index| remove(out, index))?;
@@ -25,10 +24,10 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
         remove_empty(out, path);
     }
     for (path, _) in files.new.iter().filter(|(path, _)| Some(*path) != files.index) {
-        put(&stage, out, path)?;
+        put(stage.path(), out, path)?;
     }
     sync_folders(out, files).map_err(FolderError::at(out))?;
-    files.index.map_or(Ok(()), |index| put(&stage, out, index))?;
+    files.index.map_or(Ok(()), |index| put(stage.path(), out, index))?;
     remove(out, Path::new(NOTE))?;
     step();
     sync_folder(out).map_err(FolderError::at(out))
@@ -42,13 +41,11 @@ fn note(out: &Path, old: &BTreeSet<PathBuf>, files: &FolderFiles<'_>) -> io::Res
     replace_bytes(&out.join(NOTE), names.join("\0").as_bytes())
 }
 
-fn put(stage: &Stage, out: &Path, path: &Path) -> Result<(), FolderError> {
+fn put(stage: &Path, out: &Path, path: &Path) -> Result<(), FolderError> {
     let target = out.join(path);
     let folder = folder_of(&target);
     step();
-    fs::create_dir_all(folder)
-        .and_then(|()| fs::rename(stage.path().join(path), &target))
-        .map_err(FolderError::at(&target))
+    fs::create_dir_all(folder).and_then(|()| fs::rename(stage.join(path), &target)).map_err(FolderError::at(&target))
 }
 
 fn remove(out: &Path, inside: &Path) -> Result<(), FolderError> {

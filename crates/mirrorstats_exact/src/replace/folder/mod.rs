@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use super::leftover;
 use super::place::{folder_of, make_folder, sync_folder};
 pub use stage::{Content, FolderError, FolderFiles, is_unfinished};
-use stage::{Stage, step};
+use stage::{stage, step, write};
 
 /// Replaces the files of the folder `out`, creating it and its parents if needed. Leftovers of killed processes that
 /// worked on this folder are removed.
@@ -45,8 +45,8 @@ pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
 }
 
 fn create(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
-    let stage = Stage::beside(out).map_err(FolderError::at(folder_of(out)))?;
-    stage.write(files, out)?;
+    let stage = stage(folder_of(out), out).map_err(FolderError::at(folder_of(out)))?;
+    write(stage.path(), files, out)?;
     step();
     fs::rename(stage.path(), out).map_err(FolderError::at(out))?;
     stage.keep();

@@ -46,35 +46,18 @@ impl FolderError {
     }
 }
 
-pub(super) struct Stage(TemporaryFolder);
+/// Creates a folder for the new files in `parent`, named after `target`.
+pub(super) fn stage(parent: &Path, target: &Path) -> io::Result<TemporaryFolder> {
+    step();
+    TemporaryFolder::with_mode(parent, &prefix_for(target), 0o777)
+}
 
-impl Stage {
-    /// Creates a stage that can take the place of `out`.
-    pub(super) fn beside(out: &Path) -> io::Result<Self> {
-        Self::create(folder_of(out), out)
+/// Writes the new files into `stage`; they are on the disk when this returns. `out` is for errors.
+pub(super) fn write(stage: &Path, files: &FolderFiles<'_>, out: &Path) -> Result<(), FolderError> {
+    for (path, content) in files.new {
+        write_synced(&stage.join(path), *content).map_err(FolderError::at(&out.join(path)))?;
     }
-
-    /// Creates a stage in `parent`, named after `target`.
-    pub(super) fn create(parent: &Path, target: &Path) -> io::Result<Self> {
-        step();
-        TemporaryFolder::with_mode(parent, &prefix_for(target), 0o777).map(Self)
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        self.0.path()
-    }
-
-    pub(super) fn keep(self) {
-        self.0.keep();
-    }
-
-    /// Writes the new files, which are on the disk when this returns; `out` is for errors.
-    pub(super) fn write(&self, files: &FolderFiles<'_>, out: &Path) -> Result<(), FolderError> {
-        for (path, content) in files.new {
-            write_synced(&self.path().join(path), *content).map_err(FolderError::at(&out.join(path)))?;
-        }
-        sync_folders(self.path(), files).map_err(FolderError::at(out))
-    }
+    sync_folders(stage, files).map_err(FolderError::at(out))
 }
 
 fn write_synced(path: &Path, content: Content<'_>) -> io::Result<()> {

@@ -4,20 +4,18 @@
 
 use std::collections::{BTreeSet, HashSet};
 use std::fs::File;
-use std::io::{self, BufReader, Read as _, Seek as _};
+use std::io::{self, BufReader, Read as _};
 
-use memchr::memchr2;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 use zip::{CompressionMethod, ZipArchive};
 
-use super::super::RowSink;
-use super::super::json::from_bytes;
 use super::Log;
 use crate::error::ImportError;
+use crate::json::{after_text, from_bytes};
+use crate::rows::Rows;
 use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
 
-const ARCHIVE: &[u8; 4] = b"PK\x03\x04";
 const HEADERS: [&str; 2] = ["header.json", "_journal/start.json"];
 const SAMPLES: &str = "samples/";
 const SHELL: &str = "sample.json";
@@ -33,13 +31,7 @@ const fn most_values(bytes: u64) -> Limit {
     Limit::new("values of a sample of a log of its size", 2_000_000).and_beyond(1 << 20, 64, bytes)
 }
 
-pub(crate) fn is_archive(file: &mut File) -> io::Result<bool> {
-    let mut start = [0; 4];
-    let is_archive = file.read_exact(&mut start).is_ok() && start == *ARCHIVE;
-    file.rewind().map(|()| is_archive)
-}
-
-pub(crate) fn read_archive(file: File, rows: &mut RowSink<'_>) -> Result<(), ImportError> {
+pub(super) fn read(file: File, rows: &mut Rows<'_>) -> Result<(), ImportError> {
     let expected = "a log of Inspect, an archive with a directory at its end";
     let bytes = file.metadata().map_err(ImportError::read(&rows.file))?.len();
     let mut archive =
@@ -59,13 +51,13 @@ pub(crate) fn read_archive(file: File, rows: &mut RowSink<'_>) -> Result<(), Imp
         log.add(sample, name, rows)?;
     }
     log.finish(&head["status"], rows);
-    for _ in &strays {
-        rows.mapping.count_dropped(format!("members that are no samples, the first `{}`", strays[0]));
+    if let Some(first) = strays.first() {
+        rows.notes.count(format!("members that are no samples, the first `{first}`"), strays.len() as u64);
     }
     Ok(())
 }
 
-fn damaged(rows: &RowSink<'_>, name: &str, error: &io::Error) -> ImportError {
+fn damaged(rows: &Rows<'_>, name: &str, error: &io::Error) -> ImportError {
     match error.get_ref().and_then(|error| error.downcast_ref::<Exceeded>()) {
         Some(exceeded) => rows.over(name, exceeded),
         None => rows.fault(name, "JSON of Inspect", error.to_string(), HELP),
@@ -142,27 +134,17 @@ impl EvalArchive {
 
 /// The number of commas, and eight for each list and object: even small ones reserve memory for several items.
 fn values(json: &[u8]) -> u64 {
-    let (mut values, mut rest) = (1, json);
-    while let Some((byte, after)) = rest.split_first() {
-        rest = after;
+    let (mut values, mut at) = (1, 0);
+    while let Some(byte) = json.get(at) {
+        at += 1;
         match byte {
-            b'"' => rest = after_text(rest),
+            b'"' => at = after_text(json, at),
             b',' => values += 1,
             b'[' | b'{' => values += 8,
             _ => {}
         }
     }
     values
-}
-
-fn after_text(mut rest: &[u8]) -> &[u8] {
-    while let Some(at) = memchr2(b'"', b'\\', rest) {
-        if rest[at] == b'"' {
-            return &rest[at + 1..];
-        }
-        rest = rest.get(at + 2..).unwrap_or_default();
-    }
-    &[]
 }
 
 /// The folder of a chunked sample, by the member that heads it.

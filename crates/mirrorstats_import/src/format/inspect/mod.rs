@@ -9,19 +9,60 @@ mod scores;
 mod spans;
 
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
 
 use indexmap::IndexMap;
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::RowSink;
 use crate::error::ImportError;
-use crate::line;
+use crate::json::from_reader;
+use crate::rows::{Rows, Scope};
+use crate::value::Cell;
+use mirrorstats_exact::budget::{Budget, Limit};
 
-pub(super) use archive::{is_archive, read_archive};
 use references::Copies;
 use spans::Spans;
 
-pub(super) struct Log {
+const ARCHIVE: &[u8; 4] = b"PK\x03\x04";
+
+const fn most_rows(bytes: u64) -> Limit {
+    Limit::new("bytes of rows of a log of its size, 64 more for each value", 128 << 20).and_beyond(1 << 20, 1024, bytes)
+}
+
+pub(super) fn read(mut reader: BufReader<File>, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+    let failed = ImportError::read(&rows.file);
+    let start =
+        reader.get_ref().metadata().and_then(|about| Ok((about.len(), reader.fill_buf()?.starts_with(ARCHIVE))));
+    let (bytes, is_archive) = start.map_err(failed)?;
+    rows.budget = Budget::new(most_rows(bytes));
+    if is_archive { archive::read(reader.into_inner(), rows) } else { read_json(reader, rows) }
+}
+
+/// Reads the `.json` log of Inspect, which is one object.
+fn read_json(json: BufReader<File>, rows: &mut Rows<'_>) -> Result<(), ImportError> {
+    #[derive(Deserialize)]
+    struct JsonLog {
+        #[serde(default)]
+        status: Value,
+        eval: Value,
+        #[serde(default)]
+        samples: Option<Vec<Map<String, Value>>>,
+    }
+    let help = "copy the log again, or export it with `inspect log convert --to eval`";
+    let JsonLog { status, eval, samples } = from_reader(json, true).map_err(|error| {
+        rows.fault("", "a log of Inspect, an object with `eval` and `samples`", error.to_string(), help)
+    })?;
+    let mut log = Log::new(eval);
+    for (sample, number) in samples.into_iter().flatten().zip(1_u64..) {
+        log.add(sample, &format!("sample {number}"), rows)?;
+    }
+    log.finish(&status, rows);
+    Ok(())
+}
+
+struct Log {
     eval: Value,
     /// The added epochs of each sample, by its id as JSON, in the order of the data set.
     samples: IndexMap<String, BTreeSet<i64>>,
@@ -36,7 +77,7 @@ const HELP: &str = "correct the log, or copy it again";
 const COMPLETE: &str = "success";
 
 impl Log {
-    pub(super) fn new(mut eval: Value) -> Self {
+    fn new(mut eval: Value) -> Self {
         let ids = eval["dataset"].as_object_mut().and_then(|dataset| dataset.remove("sample_ids")).unwrap_or_default();
         let ids = ids.as_array().into_iter().flatten();
         let samples: IndexMap<_, _> = ids.map(|id| (id.to_string(), BTreeSet::new())).collect();
@@ -49,7 +90,7 @@ impl Log {
     }
 
     /// Counts the listed samples that the log lacks, whose status is null in a log without an end.
-    pub(super) fn finish(&self, status: &Value, rows: &mut RowSink<'_>) {
+    fn finish(&self, status: &Value, rows: &mut Rows<'_>) {
         let status = status.as_str().unwrap_or("none");
         let listed = || self.samples.iter().take(self.listed);
         let added: u64 = listed().map(|(_, added)| added.range(1..=self.epochs.max(1)).count() as u64).sum();
@@ -62,19 +103,14 @@ impl Log {
             let what = format!(
                 "samples that the log lists and lacks, the first {id} in epoch {epoch}; its status is `{status}`"
             );
-            rows.mapping.count_all_dropped(what, absent);
+            rows.notes.count(what, absent);
         } else if status != COMPLETE {
-            rows.mapping.count_dropped(format!("end of a log, whose status is `{status}`: samples may be missing"));
+            rows.notes.count(format!("end of a log, whose status is `{status}`: samples may be missing"), 1);
         }
     }
 
     /// Adds the rows of a sample; `part` is its name in the file.
-    pub(super) fn add(
-        &mut self,
-        mut sample: Map<String, Value>,
-        part: &str,
-        rows: &mut RowSink<'_>,
-    ) -> Result<(), ImportError> {
+    fn add(&mut self, mut sample: Map<String, Value>, part: &str, rows: &mut Rows<'_>) -> Result<(), ImportError> {
         rename_deprecated(&mut sample);
         let mut take = |key: &str| sample.remove(key).unwrap_or_default();
         let (attachments, pools, events) = (take("attachments"), take("events_data"), take("events"));
@@ -82,7 +118,7 @@ impl Log {
         shape(&sample["scores"], Value::is_object, "an object as the `scores` of the sample", part, rows)?;
         for retry in sample["error_retries"].as_array().into_iter().flatten() {
             let events = retry["events"].as_array().map_or(0, Vec::len) as u64;
-            rows.mapping.count_all_dropped("events of attempts that failed and were made again".to_owned(), events);
+            rows.notes.count("events of attempts that failed and were made again".to_owned(), events);
         }
         let mut constants = self.constants(&mut sample, &mut Copies::new(&attachments, part, rows))?;
         constants.append(&mut scores::columns(&sample["scores"], &self.later_scorers, part, rows)?);
@@ -93,9 +129,9 @@ impl Log {
         }
         for (mut event, t) in steps.into_iter().zip(1_u64..) {
             let columns = step(&mut event, t, &pools, &mut Copies::new(&attachments, part, rows))?;
-            let derived = constants.iter().chain(&columns).map(|(key, value)| (key.as_str(), value));
-            let nested = [("eval", &self.eval), ("sample", &sample), ("event", &event)];
-            rows.add(&derived.chain(nested).collect::<Vec<_>>())?;
+            let columns = constants.iter().map(|(key, value)| (key.clone(), value.clone())).chain(columns).collect();
+            let scopes = [("eval", &self.eval), ("sample", &sample), ("event", &event), ("", &Value::Object(columns))];
+            rows.add(&scopes.map(|(name, value)| Scope::new(name, value)))?;
         }
         Ok(())
     }
@@ -149,7 +185,7 @@ fn flatten(
     events: Value,
     spans: &mut Spans,
     part: &str,
-    rows: &mut RowSink<'_>,
+    rows: &mut Rows<'_>,
     steps: &mut Vec<Value>,
 ) -> Result<(), ImportError> {
     shape(&events, Value::is_array, "a list as `events`", part, rows)?;
@@ -160,11 +196,10 @@ fn flatten(
         let inner = event.get_mut("events").map(Value::take).unwrap_or_default();
         match kind.as_str() {
             "model" | "tool" if is_of_scorer => {
-                rows.mapping
-                    .count_dropped(format!("events of kind {kind} of scorers, which are no steps of the agent"));
+                rows.notes.count(format!("events of kind {kind} of scorers, which are no steps of the agent"), 1);
             }
             "model" | "tool" => steps.push(event),
-            _ => rows.mapping.count_dropped(format!("events of kind {kind}")),
+            _ => rows.notes.count(format!("events of kind {kind}"), 1),
         }
         flatten(inner, spans, part, rows, steps)?;
     }
@@ -177,9 +212,9 @@ fn shape(
     is: fn(&Value) -> bool,
     expected: &str,
     part: &str,
-    rows: &RowSink<'_>,
+    rows: &Rows<'_>,
 ) -> Result<(), ImportError> {
-    let fault = || rows.fault(part, expected, line::of_json(value).shown(), HELP);
+    let fault = || rows.fault(part, expected, Cell::of_json(value).shown(), HELP);
     if value.is_null() || is(value) { Ok(()) } else { Err(fault()) }
 }
 
@@ -259,7 +294,7 @@ fn count(value: &Value, parts: f64, key: &str, copies: &Copies<'_, '_>) -> Resul
     let what = if parts > 1.0 { "a number" } else { "a whole number" };
     let fault = || {
         let expected = format!("{what} from 0 to {} as `{key}` of an event", EXACT / parts);
-        copies.rows.fault(copies.part, &expected, line::of_json(value).shown(), HELP)
+        copies.rows.fault(copies.part, &expected, Cell::of_json(value).shown(), HELP)
     };
     counted.filter(is_whole).map(|number| Some(number.round() as u64)).ok_or_else(fault)
 }

@@ -6,9 +6,9 @@ use std::ops::Range;
 
 use serde_json::Value;
 
-use super::super::RowSink;
 use crate::error::ImportError;
-use crate::line::LONGEST_LINE;
+use crate::rows::LONGEST_LINE;
+use crate::rows::Rows;
 
 /// The second is of logs before 2025.
 const PROTOCOLS: [&str; 2] = ["attachment://", "tc://"];
@@ -17,14 +17,14 @@ const VALUE: u64 = 72;
 
 /// The copies for one row. All of them are part of its line, so that they have its limit too.
 pub(super) struct Copies<'s, 'm> {
-    pub(super) rows: &'s RowSink<'m>,
+    pub(super) rows: &'s Rows<'m>,
     pub(super) part: &'s str,
     attachments: &'s Value,
     bytes: u64,
 }
 
 impl<'s, 'm> Copies<'s, 'm> {
-    pub(super) const fn new(attachments: &'s Value, part: &'s str, rows: &'s RowSink<'m>) -> Self {
+    pub(super) const fn new(attachments: &'s Value, part: &'s str, rows: &'s Rows<'m>) -> Self {
         Self { rows, part, attachments, bytes: 0 }
     }
 

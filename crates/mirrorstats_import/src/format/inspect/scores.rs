@@ -2,16 +2,16 @@
 
 use serde_json::{Map, Value, json};
 
-use super::super::RowSink;
 use super::shape;
 use crate::error::ImportError;
+use crate::rows::Rows;
 
 /// `score` of the first scorer, and a column for each. `later` are the scorers that the log lists after the first.
 pub(super) fn columns(
     scores: &Value,
     later: &[String],
     part: &str,
-    rows: &mut RowSink<'_>,
+    rows: &mut Rows<'_>,
 ) -> Result<Map<String, Value>, ImportError> {
     let mut columns = Map::new();
     columns.insert("score".to_owned(), Value::Null);
@@ -22,13 +22,13 @@ pub(super) fn columns(
         for (column, found) in parts(name, &score["value"]) {
             let value = json!(number(found));
             if value.is_null() && !found.is_null() {
-                rows.mapping.count_dropped(format!("scores without a number, of `{name}`"));
+                rows.notes.count(format!("scores without a number, of `{name}`"), 1);
             }
             if std::mem::take(&mut is_first) {
                 columns["score"] = value.clone();
             }
             if columns.contains_key(&column) {
-                rows.mapping.count_dropped(format!("scores of a second scorer for the column `{column}`"));
+                rows.notes.count(format!("scores of a second scorer for the column `{column}`"), 1);
             } else {
                 columns.insert(column, value);
             }

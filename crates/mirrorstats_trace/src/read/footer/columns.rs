@@ -20,7 +20,6 @@ pub struct FileColumn {
     pub name: String,
     /// Its logical type; `None` for a column declared as all null, which is compatible with any type.
     pub kind: Option<Kind>,
-    /// True for floats of 32 bits.
     pub is_single: bool,
 }
 
@@ -62,7 +61,6 @@ impl FolderColumn {
         take(&cast(&one, held)?, &UInt32Array::from_value(0, rows), None)
     }
 
-    /// The finding for a row of the file's own column that has another value.
     pub(crate) fn contradiction(&self, file: &str, column: &Column) -> Option<Finding> {
         let value = self.value.as_deref()?;
         let found = (0..column.len()).find_map(|row| match self.column.kind? {
@@ -72,7 +70,6 @@ impl FolderColumn {
         Some(self.contradicted(file, &found))
     }
 
-    /// The finding for the value `found` in the file's own column.
     pub fn contradicted(&self, file: &str, found: &str) -> Finding {
         let expected = format!("`{}`, as in the name of the folder", visible(self.value().unwrap_or_default()));
         let finding = Finding::new(Code::InconsistentConstant, file, expected, format!("`{}`", visible(found)));

@@ -54,7 +54,6 @@ pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Findin
     footer_of(&input.name, &mut file, extent)
 }
 
-/// The footer of an open file of this name.
 pub fn footer_of(name: &str, file: &mut File, extent: Extent) -> Result<Footer, Box<Finding>> {
     let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, name, expected, found));
     let unreadable = |error: io::Error| Finding::unreadable(name, &error);
@@ -66,8 +65,7 @@ pub fn footer_of(name: &str, file: &mut File, extent: Extent) -> Result<Footer, 
     if bytes == 0 {
         return Err(finding(Code::EmptyFile, "a Parquet file", "0 bytes".into()));
     }
-    let start = magic(file, SeekFrom::Start(0)).map_err(unreadable)?;
-    match start {
+    match magic(file, SeekFrom::Start(0)).map_err(unreadable)? {
         Some(MAGIC) => {}
         Some(ENCRYPTED_MAGIC) => {
             return Err(finding(Code::NotParquet, "a Parquet file that is not encrypted", "an encrypted one".into()));
@@ -81,11 +79,9 @@ pub fn footer_of(name: &str, file: &mut File, extent: Extent) -> Result<Footer, 
     }
     check_footer(&*file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
     let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
-    let metadata = match contained(|| reader().parse_and_finish(&*file)) {
-        Ok(Ok(metadata)) => metadata,
-        Ok(Err(error)) => return Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
-        Err(panic) => return Err(finding(Code::CorruptFooter, "a readable footer", panic)),
-    };
+    let metadata = contained(|| reader().parse_and_finish(&*file))
+        .and_then(|metadata| metadata.map_err(|error| plain(&error)))
+        .map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
     let (checksums, chunks) = verified(name, file, &metadata)?;
     Ok(Footer { bytes, metadata, checksums, chunks })
 }

@@ -59,18 +59,17 @@ pub(crate) struct Readable {
 
 impl TraceFile {
     pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
-        let opened = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
-        let Footer { bytes, metadata, checksums, .. } = opened;
-        check_version(&input.name, &metadata).map_err(|finding| vec![*finding])?;
+        let Footer { bytes, metadata, checksums, .. } = footer(input, Extent::Pages)?;
+        check_version(&input.name, &metadata)?;
         let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
         let mut pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
         let recording = footers::recording(value(&pairs, schema::RECORDING_KEY));
-        let absent = declared_experiment::absent(&input.name, &recording);
+        let experiments = declared_experiment::of_recording(&input.name, &recording);
         let is_own = value(&pairs, schema::WRITER_KEY).is_some() || !recording.is_null();
-        let folders = if is_own { Ok(Vec::new()) } else { folder_columns(&input.name, &input.path) };
-        let folders = folders.map_err(|finding| vec![*finding])?;
+        let folders = if is_own { Vec::new() } else { folder_columns(&input.name, &input.path)? };
         let all = with_folders(&columns, &folders);
         let domain = Domain::of_file(|name| all.iter().any(|column| column.name == name), &recording);
+        let absent = declared_experiment::absent(experiments.as_deref().unwrap_or_default());
         let mut findings = check_columns(&input.name, &all, domain, &absent);
         findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {
@@ -79,14 +78,14 @@ impl TraceFile {
         let rows = metadata.row_groups().iter().map(rows_of).collect();
         // They are verified, long, and apply only to this file.
         pairs.retain(|pair| pair.key != schema::CHECKSUMS_KEY);
-        let colors = DeclaredPalette::from_recording(&input.name, &recording).map_err(|f| vec![*f])?;
-        let experiments = declared_experiment::of_recording(&input.name, &recording).map_err(|f| vec![*f])?;
-        readable(metadata, &columns)
-            .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
-        let whole = || {
-            footer(input, Extent::Whole).map(|footer| Statistics::from_metadata(&footer.metadata)).unwrap_or_default()
+        let colors = DeclaredPalette::from_recording(&input.name, &recording)?;
+        let experiments = experiments?;
+        readable(&input.name, metadata, &columns)?;
+        let statistics = match checksums {
+            Checksums::Present => Statistics::default(),
+            Checksums::None | Checksums::Stale => footer(input, Extent::Whole)
+                .map_or_else(|_| Statistics::default(), |footer| Statistics::from_metadata(&footer.metadata)),
         };
-        let statistics = if checksums == Checksums::Present { Statistics::default() } else { whole() };
         Ok(Self {
             input: input.clone(),
             bytes,
@@ -117,7 +116,6 @@ impl TraceFile {
         Ok(Store::new(file, Arc::clone(&self.expansion)))
     }
 
-    /// Its path, for engines that read files themselves.
     pub fn path(&self) -> &Path {
         &self.input.path
     }
@@ -149,12 +147,10 @@ impl TraceFile {
         declared.iter().filter_map(fault).collect()
     }
 
-    /// The columns in the file itself.
     pub fn columns(&self) -> &[FileColumn] {
         &self.columns
     }
 
-    /// The columns in the names of its folders.
     pub fn folders(&self) -> &[FolderColumn] {
         &self.folders
     }
@@ -167,11 +163,13 @@ impl TraceFile {
 
     /// A column of the file or, if it has none of the name, of its folders.
     pub fn column(&self, name: &str) -> Option<&FileColumn> {
-        let all = self.columns.iter().chain(self.folders.iter().map(|folder| &folder.column));
-        all.into_iter().find(|column| column.name == name)
+        self.all_columns().find(|column| column.name == name)
     }
 
-    /// Returns true if the file has the schema's column of this name.
+    pub(crate) fn all_columns(&self) -> impl Iterator<Item = &FileColumn> {
+        self.columns.iter().chain(self.folders.iter().map(|folder| &folder.column))
+    }
+
     pub fn declares(&self, name: &str) -> bool {
         let Some((column, known)) = self.column(name).zip(self.domain.column(name)) else { return false };
         let has_kind = || column.kind.is_none_or(|kind| kind == known.stored.kind());
@@ -198,7 +196,6 @@ impl TraceFile {
         self.colors.palette.as_ref()
     }
 
-    /// The experiments in the footer, each once.
     pub fn experiments(&self) -> &[DeclaredExperiment] {
         &self.experiments
     }
@@ -219,9 +216,7 @@ impl TraceFile {
             return Ok(footer);
         }
         let Footer { metadata, chunks, .. } = self.footer_again(Extent::Pages)?;
-        let corrupt = |error| Box::new(Finding::new(Code::CorruptFooter, self.name(), "a readable schema", error));
-        let footer = readable(metadata, &self.columns).map_err(corrupt)?;
-        let footer = Arc::new(Readable { footer, chunks });
+        let footer = Arc::new(Readable { footer: readable(self.name(), metadata, &self.columns)?, chunks });
         *held = Arc::downgrade(&footer);
         Ok(footer)
     }
@@ -335,7 +330,13 @@ fn check_columns(file: &str, columns: &[FileColumn], domain: Domain, absent: &[&
     findings
 }
 
-pub(crate) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
+fn readable(
+    file: &str,
+    metadata: ParquetMetaData,
+    columns: &[FileColumn],
+) -> Result<ArrowReaderMetadata, Box<Finding>> {
     let is_text: Vec<bool> = columns.iter().map(|column| column.kind == Some(Kind::String)).collect();
-    contained(|| with_texts_as_keys(metadata, &is_text))?.map_err(|error| plain(&error))
+    contained(|| with_texts_as_keys(metadata, &is_text))
+        .and_then(|footer| footer.map_err(|error| plain(&error)))
+        .map_err(|error| Box::new(Finding::new(Code::CorruptFooter, file, "a readable schema", error)))
 }

@@ -6,8 +6,8 @@ use serde_json::Value;
 
 use super::spelling::{WORDS, did_you_mean, is_well_spelled, most_like, normal, study_color};
 use crate::diagnostic::{Code, Finding};
-use crate::episodes::palette::Color;
 use crate::schema::RECORDING_KEY;
+use crate::schema::colors::Color;
 use mirrorstats_exact::budget::{Exceeded, Limit};
 use mirrorstats_exact::escape::visible;
 
@@ -130,8 +130,8 @@ fn invalid(file: &str, palette: &Value) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::{DeclaredPalette, Palette};
-    use crate::episodes::palette::Color;
     use crate::footers::recording;
+    use crate::schema::colors::Color;
 
     #[test]
     fn a_declared_palette_is_read() {

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use regex::Regex;
 use unicode_security::skeleton;
 
-use crate::episodes::palette::Color;
+use crate::schema::colors::Color;
 use mirrorstats_exact::suggest::nearest;
 
 /// Words that some columns allow in place of a colour.

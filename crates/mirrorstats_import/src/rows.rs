@@ -1,0 +1,234 @@
+//! The destination of what formats read: objects become columns, a mapping makes steps of them, and a temporary file
+//! keeps these until their types are known.
+
+use arrow::array::{Array as _, RecordBatch};
+use indexmap::IndexMap;
+use serde_json::Value;
+
+use super::arrays::{Builder, Unreadable, table};
+use super::columns::TEXT;
+use super::error::{Fault, Faults, ImportError};
+use super::mapping::{Given, Mapping, Notes, at};
+use super::spool::{Lines, Spool};
+use super::value::Cell;
+use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
+use mirrorstats_trace::schema::COLUMNS;
+
+/// The bytes of text whose reading and writing costs as much as a value itself.
+const VALUE: u64 = 64;
+/// The most of rows in memory, with what their values take.
+const BATCH_BYTES: u64 = 8 << 20;
+const BATCH_ROWS: usize = 4096;
+
+/// A row with its whole reply; the longest reply of a model has some hundred thousand bytes.
+pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
+
+const fn most_stored(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes of rows in a file of its size", 512 << 20, 256, bytes)
+}
+
+/// An object around a row, or the row itself, which is the last one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scope<'a> {
+    /// The name of the object in paths; of the row itself and of a whole file, none.
+    pub(super) name: &'a str,
+    pub(super) value: &'a Value,
+    /// The position in its list.
+    pub(super) index: Option<usize>,
+}
+
+impl<'a> Scope<'a> {
+    pub(super) const fn new(name: &'a str, value: &'a Value) -> Self {
+        Self { name, value, index: None }
+    }
+
+    /// The value at a path, which may begin with the name of the object, and does so for one that is in no list. The path
+    /// `.` is the object itself.
+    pub(super) fn find(&self, path: &str) -> Option<&'a Value> {
+        let named = path.strip_prefix(self.name).filter(|rest| !self.name.is_empty() && rest.starts_with('.'));
+        match named {
+            Some(rest) => at(self.value, &rest[1..]),
+            None if path == "." || path == self.name => Some(self.value),
+            None if self.name.is_empty() || self.index.is_some() => at(self.value, path),
+            None => None,
+        }
+    }
+}
+
+/// The value at a path in these scopes, from the inside; `#` is the position in the innermost list.
+fn find<'a>(path: &str, scopes: &[Scope<'a>]) -> Cell<'a> {
+    let number = |index: Option<usize>| index.and_then(|index| i64::try_from(index).ok()).map_or(Cell::Null, Cell::Int);
+    let innermost = scopes.iter().rev().find_map(|scope| scope.index);
+    match path.strip_suffix('#') {
+        Some("") => return number(innermost),
+        Some(name) => return number(scopes.iter().find(|scope| scope.name == name).and_then(|scope| scope.index)),
+        None => {}
+    }
+    let path = path.replace("[#]", &format!(".{}", innermost.unwrap_or_default()));
+    scopes.iter().rev().find_map(|scope| scope.find(&path)).map_or(Cell::Null, Cell::of_json)
+}
+
+pub(super) struct Rows<'m> {
+    pub(super) file: String,
+    /// Values of the file: parts of its path, and as `file#` the first digits of its hash, which keep ids distinct
+    /// between files that number their episodes from 0.
+    given: Given,
+    pub(super) mapping: &'m Mapping,
+    pub(super) notes: &'m mut Notes,
+    /// Values of a sample or of the whole log are repeated in every row.
+    pub(super) budget: Budget,
+    pub(super) faults: Faults,
+    pub(super) noun: &'static str,
+    /// True to take lists and objects as values, which a step cannot have.
+    pub(super) is_strict: bool,
+    spool: Spool,
+    total: u64,
+    columns: IndexMap<String, Builder>,
+    /// The line of each row that is in memory.
+    lines: Vec<u64>,
+    bytes: u64,
+    /// The required columns that these rows have: a missing one is not a null.
+    required: Vec<&'static str>,
+}
+
+impl<'m> Rows<'m> {
+    pub(super) fn new(
+        file: &str,
+        given: Given,
+        bytes: u64,
+        mapping: &'m Mapping,
+        notes: &'m mut Notes,
+    ) -> Result<Self, ImportError> {
+        Ok(Self {
+            file: file.to_owned(),
+            given,
+            mapping,
+            notes,
+            budget: Budget::new(most_stored(bytes)),
+            faults: Faults::default(),
+            noun: "row",
+            is_strict: false,
+            spool: Spool::new().map_err(ImportError::read(file))?,
+            total: 0,
+            columns: IndexMap::new(),
+            lines: Vec::new(),
+            bytes: 0,
+            required: Vec::new(),
+        })
+    }
+
+    /// Adds the row in the last scope: its plain values, and what the mapping reads in all scopes.
+    pub(super) fn add(&mut self, scopes: &[Scope<'_>]) -> Result<(), ImportError> {
+        self.add_line(scopes, self.total + 1)
+    }
+
+    pub(super) fn add_line(&mut self, scopes: &[Scope<'_>], line: u64) -> Result<(), ImportError> {
+        let (mapping, row) = (self.mapping, scopes.last().map(|scope| scope.value));
+        let members = row.and_then(Value::as_object).into_iter().flatten();
+        let mut skipped = mapping.settings.skip.iter();
+        let is_there =
+            |(path, value): &(&String, &Value)| scopes.iter().rev().find_map(|scope| scope.find(path)) == Some(*value);
+        if let Some((path, value)) = skipped.find(is_there) {
+            self.notes.count(format!("rows whose `{path}` is {value}"), 1);
+            return Ok(());
+        }
+        let mut values = Vec::new();
+        let is_nested = |value: &Value| value.is_array() || value.is_object();
+        for (key, value) in members {
+            if !is_nested(value) || self.is_strict {
+                values.push((format!("{}{key}", mapping.settings.others), Cell::of_json(value)));
+            } else if !mapping.reads(key) {
+                self.notes.leave_out(key, 1);
+            }
+        }
+        let is_left_out =
+            |scope: &Scope<'_>| !scope.name.is_empty() && is_nested(scope.value) && !mapping.reads(scope.name);
+        for scope in scopes.iter().filter(|scope| is_left_out(scope)) {
+            self.notes.leave_out(scope.name, 1);
+        }
+        let paths = mapping.paths().filter(|path| !self.given.contains_key(*path));
+        let found = paths.map(|path| (path.to_owned(), find(path, scopes)));
+        let found: Vec<_> = found.filter(|(path, _)| !values.iter().any(|(key, _)| key == path)).collect();
+        values.extend(found);
+        self.push(values, line)
+    }
+
+    fn push(&mut self, values: Vec<(String, Cell<'_>)>, line: u64) -> Result<(), ImportError> {
+        let bytes = values.iter().map(|(key, value)| (key.len() + value.bytes()) as u64).sum::<u64>();
+        let work = bytes + VALUE * values.len() as u64;
+        let counted = LONGEST_LINE.check(bytes).and_then(|()| self.budget.spend(work));
+        counted.map_err(|exceeded| self.over("", &exceeded))?;
+        let has = |name: &str| values.iter().any(|(key, _)| key == name);
+        let required = COLUMNS.iter().filter(|column| column.required || column.name == TEXT);
+        let required: Vec<_> = required.map(|column| column.name).filter(|name| has(name)).collect();
+        let fits = |(key, value): &(String, Cell<'_>)| self.columns.get(key).is_none_or(|column| column.takes(value));
+        if self.lines.len() == BATCH_ROWS
+            || self.bytes + work > BATCH_BYTES
+            || required != self.required
+            || !values.iter().all(fits)
+        {
+            self.flush()?;
+        }
+        self.required = required;
+        let row = self.lines.len();
+        for (key, value) in values {
+            self.columns.entry(key).or_insert_with(|| Builder::new(row)).push(row, value);
+        }
+        self.lines.push(line);
+        self.total = line;
+        self.bytes += work;
+        Ok(())
+    }
+
+    /// Maps and stores the rows in memory.
+    fn flush(&mut self) -> Result<(), ImportError> {
+        if self.lines.is_empty() {
+            return Ok(());
+        }
+        let (columns, lines) = (std::mem::take(&mut self.columns), std::mem::take(&mut self.lines));
+        let count = lines.len();
+        let columns = columns.into_iter().map(|(name, column)| (name, column.finish(count))).collect();
+        self.bytes = 0;
+        self.store(&table(columns, count), Lines::of(lines))
+    }
+
+    /// Adds the rows of a table.
+    pub(super) fn add_table(&mut self, table: &RecordBatch) -> Result<(), ImportError> {
+        for (field, values) in table.schema_ref().fields().iter().zip(table.columns()) {
+            if values.data_type().is_nested() && !self.mapping.reads(field.name()) {
+                self.notes.leave_out(field.name(), (values.len() - values.null_count()) as u64);
+            }
+        }
+        let first = self.total + 1;
+        self.total += table.num_rows() as u64;
+        self.store(table, Lines::From(first))
+    }
+
+    fn store(&mut self, table: &RecordBatch, lines: Lines) -> Result<(), ImportError> {
+        let rows = self.mapping.apply(table, &self.given);
+        let rows = rows.map_err(|(name, Unreadable { row, expected, found })| {
+            let help = "correct the value, or leave the column out: `--set COLUMN=VALUE` replaces it";
+            let line = Some(lines.at(row));
+            Fault { file: self.file.clone(), line, noun: self.noun, ..Fault::new(expected, found, help).of_key(&name) }
+        })?;
+        self.spool.add(&rows, lines).map_err(|error| self.failed(&error))
+    }
+
+    fn failed(&self, error: &arrow::error::ArrowError) -> ImportError {
+        ImportError::read(&self.file)(std::io::Error::other(error.to_string()))
+    }
+
+    pub(super) fn fault(&self, part: &str, expected: &str, found: impl Into<String>, help: &str) -> ImportError {
+        let file = if part.is_empty() { self.file.clone() } else { format!("{}, {part}", self.file) };
+        Fault { file, ..Fault::new(expected, found, help) }.into()
+    }
+
+    pub(super) fn over(&self, part: &str, exceeded: &Exceeded) -> ImportError {
+        self.fault(part, &exceeded.expected(), "more", &Exceeded::help())
+    }
+
+    pub(super) fn finish(mut self) -> Result<(Spool, Faults), ImportError> {
+        self.flush()?;
+        Ok((self.spool, self.faults))
+    }
+}

@@ -1,0 +1,137 @@
+//! The second pass: casts the rows of every episode and writes them in their order.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{Int32Array, RecordBatch, UInt32Array, new_null_array};
+use arrow::compute::{concat_batches, take_record_batch};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::error::ArrowError;
+use parquet::errors::ParquetError;
+
+use super::Limits;
+use super::arrays::stored;
+use super::columns::Columns;
+use super::error::ImportError;
+use super::index::IndexedStep;
+use super::mapping::Order;
+use super::text::Text;
+use mirrorstats_exact::replace::NewFile;
+use mirrorstats_trace::episodes::identification::put_version;
+use mirrorstats_trace::error::TraceError;
+use mirrorstats_trace::schema::Kind;
+use mirrorstats_trace::write::row_groups::{RowGroups, field};
+
+/// Writes the rows to a temporary file beside `out`.
+pub(super) fn write(
+    texts: &[Text],
+    columns: &mut Columns,
+    steps: &[IndexedStep],
+    out: &Path,
+    limits: Limits<'_>,
+) -> Result<NewFile, ImportError> {
+    let mut recording = limits.recording(texts);
+    if columns.is_derived {
+        put_version(&mut recording);
+    }
+    let file = NewFile::create(out).map_err(|error| TraceError::write(out, error))?;
+    let failed = |error: ParquetError| TraceError::write(out, error);
+    let (fields, kinds): (Vec<_>, Vec<_>) = fields(columns, limits).unzip();
+    let layout = Arc::new(Schema::new(fields));
+    let mut file = RowGroups::new(file, &layout, Some(&recording)).map_err(failed)?;
+    let mut gathering = Gathering { texts, columns, limits, layout, kinds, last: None };
+    let (mut start, mut end) = (0, 0);
+    for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
+        end += episode.len();
+        if file.is_due(end - start) || end == steps.len() {
+            file.write(&gathering.rows(&steps[start..end])?).map_err(failed)?;
+            start = end;
+        }
+    }
+    Ok(file.finish(None).map_err(failed)?)
+}
+
+/// The columns of the trace. A declared type holds whole numbers of a float column, and columns of nulls. A column of
+/// nulls without it is compatible with any type in other files.
+fn fields(columns: &Columns, limits: Limits<'_>) -> impl Iterator<Item = (Field, Option<Kind>)> {
+    let known = columns.known().map(|column| (field(column), Some(column.stored.kind())));
+    let own = columns.own().into_iter().map(move |own| {
+        let kind = limits.declared(&own.name).map(|declared| declared.kind).or(own.kind);
+        (Field::new(&own.name, kind.map_or(DataType::Null, Kind::data_type), true), kind)
+    });
+    known.chain(own)
+}
+
+struct Gathering<'a> {
+    texts: &'a [Text],
+    columns: &'a mut Columns,
+    limits: Limits<'a>,
+    layout: SchemaRef,
+    kinds: Vec<Option<Kind>>,
+    last: Option<((u32, u32), RecordBatch)>,
+}
+
+impl Gathering<'_> {
+    /// The rows of these steps in their order. Each batch is read once, however scattered its rows are.
+    fn rows(&mut self, steps: &[IndexedStep]) -> Result<RecordBatch, ImportError> {
+        let mut by_batch: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
+        for (at, step) in steps.iter().enumerate() {
+            by_batch.entry((step.text, step.batch)).or_default().push(at);
+        }
+        let (mut parts, mut places) = (Vec::new(), vec![0; steps.len()]);
+        let mut gathered = 0;
+        for (batch, positions) in by_batch {
+            for at in &positions {
+                places[*at] = gathered;
+                gathered += 1;
+            }
+            let rows: UInt32Array = positions.iter().map(|at| Some(steps[*at].row)).collect();
+            let failed = self.texts[batch.0 as usize].failed();
+            parts.push(take_record_batch(self.batch(batch)?, &rows).map_err(failed)?);
+        }
+        let failed = self.texts[steps[0].text as usize].failed();
+        self.joined(&parts, places, steps).map_err(failed)
+    }
+
+    fn joined(
+        &self,
+        parts: &[RecordBatch],
+        places: Vec<u32>,
+        steps: &[IndexedStep],
+    ) -> Result<RecordBatch, ArrowError> {
+        let mut rows = concat_batches(&self.layout, parts)?;
+        if !places.is_sorted() {
+            rows = take_record_batch(&rows, &UInt32Array::from(places))?;
+        }
+        let is_ordered = |text: &Text| text.read.as_ref().is_some_and(|read| read.order != Order::Numbers);
+        let t = self.layout.index_of("t")?;
+        if self.texts.iter().any(is_ordered) {
+            let mut columns = rows.columns().to_vec();
+            let numbers = steps.chunk_by(|a, b| a.episode == b.episode).flat_map(|episode| (1..).take(episode.len()));
+            columns[t] = Arc::new(numbers.collect::<Int32Array>());
+            rows = RecordBatch::try_new(Arc::clone(&self.layout), columns)?;
+        }
+        Ok(rows)
+    }
+
+    fn batch(&mut self, place: (u32, u32)) -> Result<&RecordBatch, ImportError> {
+        if self.last.as_ref().is_none_or(|(last, _)| *last != place) {
+            let text = &self.texts[place.0 as usize];
+            let rows = text.batch(place.1 as usize)?;
+            let (rows, _) = self.columns.completed(&rows, &text.folders, self.limits);
+            self.last = Some((place, self.cast(&rows).map_err(text.failed())?));
+        }
+        let (_, rows) = self.last.as_ref().expect("it was just read");
+        Ok(rows)
+    }
+
+    fn cast(&self, rows: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+        let columns = self.layout.fields().iter().zip(&self.kinds).map(|(field, kind)| {
+            let values = rows.column_by_name(field.name()).zip(*kind);
+            let nulls = || Ok(new_null_array(field.data_type(), rows.num_rows()));
+            values.map_or_else(nulls, |(values, kind)| stored(values, kind, field.data_type()))
+        });
+        RecordBatch::try_new(Arc::clone(&self.layout), columns.collect::<Result<_, _>>()?)
+    }
+}

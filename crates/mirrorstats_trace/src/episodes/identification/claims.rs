@@ -1,0 +1,250 @@
+//! From clauses to claims about oneself.
+
+use super::chunks::{Link, Noun, Owner, chunks};
+use super::clauses::{Clause, clauses};
+use super::entities::{Claim, Entities, Statement, Who};
+use super::lexicon::Class::{
+    Agent, Answer, Are, As, Away, Believe, Except, Feature, I, In, Mirror, Not, Part, Plain, Reflection, This, Turn,
+    Worn, Wrong,
+};
+use super::lexicon::Hue;
+use super::moods::{Mood, governed, own, void_spans};
+use super::tokens::Sentence;
+
+#[derive(Default)]
+pub struct Reader {
+    pub(super) entities: Entities,
+    /// The number of corrections so far.
+    pub(super) turn: u32,
+    /// The subject of the clause before.
+    pub(super) topic: Option<usize>,
+    /// The phrase before a relative clause, which goes on behind it.
+    pub(super) antecedent: Option<usize>,
+    /// The colours of a former belief or of a report, which evidence may confirm.
+    pub(super) held: Option<Vec<Hue>>,
+    pub(super) was_question: bool,
+    /// The labels are those of another: "type: cube; color: red".
+    pub(super) is_of_other: bool,
+    pub(super) sentences: usize,
+}
+
+/// The state of one sentence.
+pub(super) struct Context<'a> {
+    pub mood: Mood,
+    /// The mood of a clause that the clause before governs.
+    pub governed: Mood,
+    pub label: Option<Who>,
+    pub next: Option<&'a Clause>,
+    /// The last noun phrase of the clause before.
+    pub neighbor: Option<usize>,
+    /// No clause before names anything: "unknown, maybe red".
+    pub is_plain: bool,
+    /// The clause before denies.
+    pub was_denied: bool,
+}
+
+/// A clause with its entities.
+pub(super) struct Scene<'a> {
+    pub clause: &'a Clause,
+    pub entities: Vec<Option<usize>>,
+    pub subject: Option<usize>,
+    pub mood: Mood,
+}
+
+impl<'a> Scene<'a> {
+    pub fn noun(&self, at: usize) -> Option<(&'a Noun, usize)> {
+        Some((self.clause.noun(at)?, self.entities[at]?))
+    }
+
+    pub fn subject_noun(&self) -> Option<&'a Noun> {
+        let is_subject = |at: &usize| self.subject.is_some() && self.entities[*at] == self.subject;
+        self.clause.nouns().find(|(at, _)| is_subject(at)).map(|(_, noun)| noun)
+    }
+}
+
+impl Context<'_> {
+    pub fn next_is(&self, links: &[Link]) -> bool {
+        self.next.and_then(|next| next.link).is_some_and(|link| links.contains(&link))
+    }
+
+    /// "the red robot and I are", "the red robot and the cube are"
+    pub fn is_conjoined(&self) -> bool {
+        let is_subject = |next: &Clause| {
+            let verb = next.verbs().next().filter(|(_, verb)| verb.is_finite);
+            verb.is_some_and(|(_, verb)| next.noun(0).is_some_and(|noun| !noun.all.has(I) || verb.all.has(Are)))
+        };
+        self.next_is(&[Link::And]) && self.next.is_some_and(is_subject)
+    }
+
+    fn has_alternative(&self) -> bool {
+        self.next_is(&[Link::Or]) && !self.next.is_some_and(Clause::has_verb)
+    }
+}
+
+impl Reader {
+    pub fn add(&mut self, sentence: &Sentence) {
+        let all = clauses(&chunks(&sentence.words));
+        let mut context = Context {
+            mood: Mood::Asserted,
+            governed: Mood::Asserted,
+            label: None,
+            next: None,
+            neighbor: None,
+            is_plain: true,
+            was_denied: false,
+        };
+        let void = void_spans(&all);
+        self.topic = None;
+        for (at, clause) in all.iter().enumerate() {
+            context.next = all.get(at + 1);
+            let is_void = sentence.is_question || void.contains(&clause.span);
+            context.mood = match clause.link {
+                _ if is_void => Mood::Void,
+                Some(Link::That | Link::Implicit) => context.governed,
+                Some(Link::If | Link::Whether) => Mood::Void,
+                Some(Link::Or) => context.mood,
+                Some(Link::And | Link::Comma) if !clause.has_verb() && context.mood != Mood::Held => context.mood,
+                _ => Mood::Asserted,
+            };
+            self.clause(clause, &mut context);
+            context.is_plain &= !clause.has_verb() && clause.nouns().all(|(_, noun)| noun.head.is_empty());
+        }
+        self.was_question = sentence.is_question;
+        self.sentences += 1;
+    }
+
+    pub fn claim(&self) -> Claim {
+        self.entities.claim()
+    }
+
+    fn clause(&mut self, clause: &Clause, context: &mut Context<'_>) {
+        self.turn += u32::from(clause.marks.has(Turn) || clause.has_noun(Turn) || clause.link == Some(Link::But));
+        let mut scene = self.scene(clause, context);
+        if matches!(scene.mood, Mood::Asserted) && context.has_alternative() {
+            scene.mood = Mood::Weak;
+        }
+        let is_source = self.entities.is(scene.subject, Who::Source);
+        if (clause.has(Wrong) || clause.has_noun(Wrong)) && !is_source {
+            self.entities.retract();
+            // "I was wrong about being red"
+            if !clause.marks.has(Wrong) || clause.verbs().any(|(_, verb)| verb.all.has(Wrong)) {
+                scene.mood = Mood::Void;
+            }
+        }
+        self.attributes(&scene);
+        self.is_of_other &= !clause.has_verb();
+        for (at, verb) in clause.verbs() {
+            self.predicate(&scene, at, verb);
+        }
+        if clause.has_verb() {
+            self.label(&scene, context);
+        } else {
+            self.fragment(&scene, context);
+        }
+        context.governed = governed(&self.entities, &scene);
+        // ", I think,"
+        let is_aside = clause.link == Some(Link::Comma) && clause.chunks.len() == 2 && clause.has(Believe);
+        if is_aside {
+            self.topic = context.neighbor.or(self.topic);
+        } else if clause.has_verb() || clause.link != Some(Link::Comma) {
+            self.topic = scene.subject.or(self.topic);
+        }
+        context.mood = scene.mood;
+        context.was_denied = clause.has(Not) || clause.has_noun(Not);
+        context.neighbor = self.neighbor(&scene);
+    }
+
+    /// Finds the entities and the subject of a clause.
+    fn scene<'a>(&mut self, clause: &'a Clause, context: &Context<'_>) -> Scene<'a> {
+        let before = context.neighbor.or(self.entities.last);
+        self.entities.is_fresh = false;
+        let mut entities = vec![None; clause.chunks.len()];
+        for (at, noun) in clause.nouns() {
+            entities[at] = Some(self.entities.resolve(noun, clause.preposition(at).is_some()));
+        }
+        let verb_at = clause.verbs().next().map_or(clause.chunks.len(), |(at, _)| at);
+        let first = clause.nouns().find(|(at, _)| clause.preposition(*at).is_none() && *at < verb_at);
+        let first = first.and_then(|(at, _)| entities[at]);
+        let listed = [Link::Comma, Link::And, Link::But, Link::Or, Link::So].map(Some);
+        let subject = match clause.link {
+            Some(Link::Relative) => first.or(before),
+            Some(Link::Resumed) => self.antecedent,
+            link if first.is_none() && verb_at == 0 && listed.contains(&link) => self.topic,
+            _ => first,
+        };
+        self.antecedent = match clause.link {
+            Some(Link::Relative | Link::Implicit | Link::That) => before,
+            Some(Link::Resumed) => self.antecedent,
+            _ => subject,
+        };
+        self.places(clause, &entities);
+        let mood = own(&self.entities, clause, subject, context);
+        Scene { clause, entities, subject, mood }
+    }
+
+    /// "the robot in front of me", "the figure near the wall", "the color on the cube" are others.
+    fn places(&mut self, clause: &Clause, entities: &[Option<usize>]) {
+        for (at, noun) in clause.nouns() {
+            let Some(word) = clause.preposition(at) else { continue };
+            let Some((head, entity)) = at.checked_sub(2).and_then(|at| Some((clause.noun(at)?, entities[at]?))) else {
+                continue;
+            };
+            let is_color = head.head.has_any(&[Answer, Reflection]) && head.owner == Owner::Nobody;
+            let is_on_other = is_color && !word.has(In) && super::entities::who(noun) == Who::Other;
+            let is_agent = head.head.has(Agent) && head.owner == Owner::Nobody && !head.all.has(This);
+            let is_away = noun.all.has(Away) || noun.owner == Owner::Me && !noun.is_own();
+            let is_beside_me = noun.is_pronoun() && noun.owner == Owner::Me || !word.has(Plain);
+            let is_placed = !word.has(As) && is_beside_me || is_away;
+            if is_on_other || is_placed && (is_agent || self.entities.is(Some(entity), Who::Maybe)) {
+                self.entities.disown(entity);
+            }
+        }
+    }
+
+    /// The last noun phrase, without its places.
+    fn neighbor(&self, scene: &Scene<'_>) -> Option<usize> {
+        let (at, noun) = scene.clause.nouns().last()?;
+        let is_plain = !noun.all.has(Not) && (noun.is_named() || noun.is_pronoun());
+        let head = at.checked_sub(2).and_then(|at| scene.entities[at]);
+        let is_head = |head: &usize| !self.entities.is(Some(*head), Who::Me) || noun.head.has(Mirror);
+        let found = if scene.clause.preposition(at).is_some() { head.filter(is_head) } else { scene.entities[at] };
+        found.filter(|_| is_plain)
+    }
+
+    /// Colours before their noun: "my red body", "a red robot", "a robot with a red body".
+    fn attributes(&mut self, scene: &Scene<'_>) {
+        for (at, noun) in scene.clause.nouns().filter(|(_, noun)| !noun.hues.is_empty()) {
+            let word = scene.clause.preposition(at).unwrap_or_default();
+            let Some(entity) = scene.entities[at].filter(|_| !word.has(Except)) else { continue };
+            self.state(scene, entity, noun, noun.all.has(Not));
+            let is_worn = noun.is_bare() || noun.head.has_any(&[Feature, Answer]) && noun.owner == Owner::Nobody;
+            let Some((wearer, entity)) = at.checked_sub(2).and_then(|at| scene.noun(at)) else { continue };
+            if is_worn && word.has(Worn) && wearer.hues.is_empty() && wearer.head.has_any(&[Agent, Reflection]) {
+                self.state(scene, entity, noun, noun.all.has(Not));
+            }
+        }
+    }
+
+    /// Records that an entity has the colours of a noun phrase.
+    pub(super) fn state(&mut self, scene: &Scene<'_>, entity: usize, noun: &Noun, is_denied: bool) {
+        match scene.mood {
+            _ if noun.hues.is_empty() => {}
+            Mood::Asserted | Mood::Weak => {
+                let is_part = noun.head.has(Part) || scene.subject_noun().is_some_and(|subject| subject.head.has(Part));
+                let (hues, turn) = (noun.hues.clone(), self.turn);
+                self.entities.statements.push(Statement { entity, hues, is_denied, is_part, turn });
+            }
+            Mood::Held => self.held = Some(noun.hues.clone()),
+            Mood::Void => self.held = self.held.take().or_else(|| Some(noun.hues.clone())),
+        }
+    }
+
+    /// Records that an entity is the author, or is not.
+    pub(super) fn identify(&mut self, scene: &Scene<'_>, entity: usize, is_denied: bool) {
+        match scene.mood {
+            Mood::Asserted | Mood::Weak if is_denied => self.entities.disown(entity),
+            Mood::Asserted => self.entities[entity].who = Who::Me,
+            _ => {}
+        }
+    }
+}

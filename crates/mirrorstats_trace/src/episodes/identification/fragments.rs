@@ -1,0 +1,120 @@
+//! What labels and clauses without a verb say: "color: red", ", a red robot".
+
+use super::chunks::{Link, Noun, Owner};
+use super::claims::{Context, Reader, Scene};
+use super::entities::Who;
+use super::lexicon::Class::{Agent, Anaphor, Answer, Article, I, Mirror, Not, Reflection, See, Seek, Thing};
+use super::moods::Mood;
+use super::predicates::Phrase;
+
+impl Reader {
+    /// A label before a colon whose clause has a verb: "My reflection is visible:", "I see myself:".
+    pub(super) fn label(&mut self, scene: &Scene<'_>, context: &mut Context<'_>) {
+        if !context.next_is(&[Link::Colon]) {
+            return;
+        }
+        let verb_at = scene.clause.verbs().next().map_or(0, |(at, _)| at);
+        let object = scene.noun(verb_at + 1).filter(|(noun, _)| !noun.all.has(I));
+        let is_search = scene.clause.verbs().any(|(_, verb)| verb.main().has_any(&[See, Seek]));
+        let is_own =
+            object.is_some_and(|(_, entity)| self.is_me(Some(entity))) || self.is_me(scene.subject) && !is_search;
+        let is_other = object.is_some_and(|(_, entity)| self.entities.is(Some(entity), Who::Other));
+        let is_it = scene.clause.has_noun(Anaphor) && scene.clause.nouns().all(|(_, noun)| !noun.is_named());
+        let looks = scene.clause.nouns().any(|(_, noun)| noun.head.has(Mirror)) && scene.subject.is_none();
+        let is_mirror = self.entities.is(scene.subject, Who::Mirror) && !is_other || is_it || looks;
+        context.label = Some(match () {
+            () if is_own => Who::Me,
+            () if is_mirror => Who::Mirror,
+            () => Who::Other,
+        });
+        self.is_of_other = context.label == Some(Who::Other);
+    }
+
+    /// A clause without a verb: "red", "color: red", ", a red robot".
+    pub(super) fn fragment(&mut self, scene: &Scene<'_>, context: &mut Context<'_>) {
+        let clause = scene.clause;
+        let found = clause.nouns().find(|(at, _)| clause.preposition(*at).is_none());
+        let Some((at, noun)) = found else {
+            if context.next_is(&[Link::Colon]) && !clause.chunks.is_empty() {
+                context.label = Some(Who::Other);
+            }
+            return;
+        };
+        let Some(entity) = scene.entities[at] else { return };
+        let who = self.entities[entity].who;
+        if let Some(bare) = clause.noun(at + 1).filter(|bare| bare.is_bare() && noun.hues.is_empty()) {
+            // "own color red", "robot body white"
+            self.entities[entity].is_answer |= who == Who::Me || who == Who::Maybe && self.sentences == 0;
+            return self.state(scene, entity, bare, bare.all.has(Not));
+        }
+        if clause.noun(at + 1).is_some_and(Noun::is_strange) {
+            // "red robot, not me"
+            return;
+        }
+        if context.next_is(&[Link::Colon]) && noun.hues.is_empty() {
+            let is_label = matches!(who, Who::Me | Who::Maybe | Who::Source | Who::Mirror) && !noun.all.has(Not);
+            let is_vague = noun.head.has(Answer) && noun.owner == Owner::Nobody;
+            self.is_of_other = !is_label || is_vague && self.is_of_other;
+            context.label = Some(if self.is_of_other { Who::Other } else { who });
+            return;
+        }
+        let is_subject =
+            context.next_is(&[Link::Relative, Link::Implicit, Link::Resumed, Link::That]) && who != Who::Me;
+        if !is_subject && !context.is_conjoined() {
+            self.answer(scene, context, (noun, entity));
+        }
+    }
+
+    /// A phrase without a verb that may be the answer itself, or belong to the phrase before.
+    fn answer(&mut self, scene: &Scene<'_>, context: &Context<'_>, (noun, entity): Phrase<'_>) {
+        let link = scene.clause.link.unwrap_or(Link::Start);
+        let starts = matches!(link, Link::Start | Link::But | Link::So | Link::Colon);
+        let neighbor = context.neighbor.filter(|_| context.label.is_none() && (!starts || link == Link::Colon));
+        let is_denied = noun.all.has(Not);
+        let topic = self.topic.filter(|_| matches!(link, Link::But | Link::So));
+        let is_first = self.sentences == 0 || self.was_question || link != Link::Start;
+        let was_answer = neighbor.is_some_and(|neighbor| self.entities[neighbor].is_answer);
+        if context.label.is_some() || scene.mood == Mood::Void {
+            self.is_of_other = self.entities[entity].who == Who::Other && noun.is_strange();
+        }
+        match (self.entities[entity].who, context.label) {
+            (Who::Maybe, Some(Who::Other | Who::Source | Who::Mirror)) => self.entities.disown(entity),
+            (_, Some(Who::Other | Who::Source)) => {}
+            (Who::Bare, Some(_)) | (Who::Maybe, Some(Who::Me | Who::Maybe)) => self.entities[entity].is_answer = true,
+            // "Other? Red."
+            (Who::Bare, None) if self.was_question && self.is_of_other => {}
+            (Who::Bare, None) if is_denied => self.entities[entity].is_answer = true,
+            (Who::Bare, None) if context.was_denied && noun.all.has(Article) => {}
+            (Who::Bare, None) => {
+                if let Some(bearer) = neighbor.map(|near| self.entities[near].bearer.unwrap_or(near)).or(topic) {
+                    self.entities[entity].bearer = Some(bearer);
+                    self.state(scene, bearer, noun, false);
+                } else {
+                    let is_free = starts && (link != Link::But || context.was_denied);
+                    self.entities[entity].is_answer = is_free || context.is_plain;
+                }
+            }
+            (Who::Maybe, None) if starts && is_first => self.entities[entity].is_answer = true,
+            (Who::Maybe, None)
+                if link == Link::Comma && (self.is_me(neighbor) || was_answer) && !context.was_denied =>
+            {
+                self.entities[entity].is_answer |= was_answer;
+                if !was_answer {
+                    self.identify(scene, entity, is_denied);
+                }
+            }
+            (Who::Me, None)
+                if link == Link::Comma && (was_answer || noun.is_pronoun() || noun.head.has(Reflection)) =>
+            {
+                if let Some(neighbor) = neighbor {
+                    self.identify(scene, neighbor, is_denied);
+                }
+            }
+            (Who::Other, None) if was_answer && !is_denied && matches!(link, Link::Comma | Link::And | Link::Colon) => {
+                let is_named = noun.head.has_any(&[Thing, Agent]) || noun.is_pronoun() || noun.is_strange();
+                neighbor.filter(|_| is_named).into_iter().for_each(|neighbor| self.entities.disown(neighbor));
+            }
+            _ => {}
+        }
+    }
+}

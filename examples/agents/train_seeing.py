@@ -66,7 +66,7 @@ def walk(folder):
     for line in sys.stdin:
         message = json.loads(line)
         if message["kind"] == "task":
-            name, rng = message["episode_id"].replace("/", "_"), random.Random(message["seed"])
+            rng = random.Random(message["seed"])
         elif message["kind"] == "observation":
             picture = sight.decode_png(pathlib.Path(message["image"]["path"]).read_bytes())
             frames.append(network.shrunk(picture).astype(np.float16))
@@ -75,7 +75,7 @@ def walk(folder):
                     "identification": "unknown", "selected_cube": "none"}
             print(json.dumps(said), flush=True)
         else:
-            np.save(pathlib.Path(folder) / f"{name}.npy", np.array(frames))
+            np.save(pathlib.Path(folder) / (message["episode_id"].replace("/", "_") + ".npy"), np.array(frames))
             return
 
 

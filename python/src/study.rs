@@ -54,7 +54,9 @@ impl Asked {
         let (definitions, filter) = (self.definitions.map(Into::into), self.r#where);
         let (metrics, by, pool) = (self.metrics, self.by, self.pool);
         let question = Question { definitions, filter, metrics, by, pool, lost, ..Question::default() };
-        let study = mirrorstats::Study::open(self.paths).map_err(error::of_study)?;
+        let paths: Vec<_> = self.paths.into_iter().map(Into::into).collect();
+        let inputs = mirrorstats::resolve(&paths, std::io::empty()).map_err(error::of_study)?;
+        let study = mirrorstats::Study::with_logs(inputs, question.definitions.as_deref()).map_err(error::of_study)?;
         let study = study.asked(question).map_err(error::of_study)?;
         Ok(match self.threads {
             Some(threads) => study.threads(threads),

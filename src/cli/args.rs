@@ -3,7 +3,7 @@
 use std::ffi::OsString;
 use std::io;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[cfg(feature = "sim")]
 use clap::builder::OsStringValueParser;
@@ -20,7 +20,7 @@ use mirrorstats_study::question::Question;
 /// The traces to read.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TraceArgs {
-    /// Trace files, folders of them, quoted globs, or `-` for a list of files on standard input
+    /// Traces or logs that `import` reads: files, folders, quoted globs, or `-` for a list of files on standard input
     #[arg(required = true, value_name = "TRACES")]
     pub traces: Vec<OsString>,
     #[command(flatten)]
@@ -28,16 +28,17 @@ pub struct TraceArgs {
 }
 
 impl TraceArgs {
-    pub fn open(&self) -> Result<Study, Failure> {
+    pub fn open(&self, definitions: Option<&Path>) -> Result<Study, Failure> {
         let inputs = resolve(&self.traces, io::stdin().lock())?;
-        let study = Study::of(inputs)?.threads(self.threads.count());
+        let study = Study::with_logs(inputs, definitions)?.threads(self.threads.count());
+        output::notes(study.logs.as_ref().map_or(&[][..], |logs| &logs.notes));
         output::notes(study.stale_checksums().as_slice());
         Ok(study)
     }
 
     /// Opens the files as a study with these questions.
     pub fn study(&self, scoring: &ScoringArgs, grouping: &GroupingArgs) -> Result<Study, Failure> {
-        let study = self.open()?.asked(scoring.question(grouping))?;
+        let study = self.open(scoring.definitions.as_deref())?.asked(scoring.question(grouping))?;
         output::notes(study.carried_note().as_slice());
         Ok(study)
     }

@@ -82,8 +82,7 @@ fn listed(faults: &[Fault], more: usize) -> String {
         let columns = OF_MIRRORS.map(|column| format!("`{column}`")).join(", ");
         format!(
             "this looks like another domain: expected columns of the domain `mirror`, found none of {columns}\n  \
-             help: give --definitions a file that says `domain = \"NAME\"`, or name the keys that have the columns with \
-             --map; see docs/how-to/domains.md\n"
+             help: `mirrorstats import --guess FILE` drafts its mapping and definitions; see docs/how-to/domains.md\n"
         )
     });
     let of_mirror = |fault: &&Fault| !is_other || fault.found != "none" || fault.key.as_deref().is_none_or(is_general);

@@ -16,6 +16,7 @@ mod arrays;
 mod columns;
 mod error;
 mod format;
+mod guess;
 mod index;
 mod json;
 mod mapping;
@@ -36,6 +37,7 @@ use serde_json::json;
 pub use columns::Own;
 pub use error::{Fault, ImportError};
 pub use format::Format;
+pub use guess::{Draft, guess};
 pub use mapping::{Mapping, MappingError, Notes};
 pub use text::Text;
 

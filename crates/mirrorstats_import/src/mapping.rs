@@ -36,8 +36,8 @@ pub struct Mapping {
     is_built_in: bool,
 }
 
+/// A file with a mapping. It may be a definition file, whose other tables are read there.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
 struct MappingFile {
     import: Settings,
 }
@@ -169,15 +169,19 @@ impl Mapping {
         Ok(mapping)
     }
 
+    /// The mapping in a definition file; `None` without the table `[import]`. What else is wrong with the file is left to
+    /// the reader of definitions.
+    pub fn of_definitions(path: &FilePath) -> Result<Option<Self>, MappingError> {
+        let text = input::text(path, LARGEST_FILE).unwrap_or_default();
+        let has_one = toml::from_str::<toml::Table>(&text).is_ok_and(|file| file.contains_key("import"));
+        has_one.then(|| Self::read(path)).transpose()
+    }
+
     fn read(path: &FilePath) -> Result<Self, MappingError> {
         let text = input::text(path, LARGEST_FILE).map_err(|error| error.to_string());
         text.and_then(|text| Self::of_text(&text)).map_err(|found| {
             let expected = "a format, or a mapping file with `[import]`";
-            MappingError {
-                place: format!("--from {}", Input::new(path).name),
-                expected,
-                found: found.trim_end().into(),
-            }
+            MappingError { place: Input::new(path).name, expected, found: found.trim_end().into() }
         })
     }
 

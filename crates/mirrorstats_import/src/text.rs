@@ -3,7 +3,7 @@
 //! Input that cannot be read twice (standard input, a pipe) and compressed files go through a temporary file.
 
 use std::fs::File;
-use std::io::{self, Read, Seek as _};
+use std::io::{self, BufReader, Read, Seek as _};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -14,6 +14,7 @@ use serde_json::Value;
 use super::error::{Fault, Faults, ImportError, Location};
 use super::format::lerobot;
 use super::format::{Format, HEAD};
+use super::json::BYTE_ORDER_MARK;
 use super::mapping::{Given, Mapping, Notes, Order};
 use super::rows::Rows;
 use super::spool::Spool;
@@ -126,6 +127,33 @@ impl Text {
         let read = |rows: &mut Rows<'_>| format.read(file, rows);
         self.read = Some(Steps::of((&self.name, bytes, sha256), (format, effective, mapping), given, notes, read)?);
         Ok(())
+    }
+
+    /// The format if it has a mapping of its own; else, if the file is JSON, its first values.
+    pub(super) fn sample(&mut self, most: usize) -> Result<(Option<Format>, Option<Vec<Value>>), ImportError> {
+        let head = self.head()?;
+        let format = Format::detect(&self.name, &head, false);
+        if format == Format::Inspect || format.mapping(&head).is_some() {
+            return Ok((Some(format), None));
+        }
+        if format != Format::JsonLines {
+            return Ok((None, None));
+        }
+        let start = head.strip_prefix(BYTE_ORDER_MARK).map_or(0, |_| BYTE_ORDER_MARK.len() as u64);
+        self.file.seek(io::SeekFrom::Start(start)).map_err(ImportError::read(&self.name))?;
+        let values = serde_json::Deserializer::from_reader(BufReader::new(&self.file)).into_iter::<Value>();
+        let values = values.take(most).collect::<Result<Vec<_>, _>>().map_err(|error| Fault {
+            expected: "strict JSON: an object per line, a list of objects, or one object".into(),
+            found: error.to_string(),
+            help: "correct the file; NaN and infinities are no JSON".into(),
+            ..Fault::of_file(&self.name)
+        })?;
+        let items = |value| if let Value::Array(items) = value { items } else { vec![value] };
+        Ok((None, Some(values.into_iter().flat_map(items).filter(Value::is_object).collect())))
+    }
+
+    pub(super) fn batches(&self) -> usize {
+        self.read.as_ref().map_or(0, |read| read.spool.batches.len())
     }
 
     /// The frames of a data set of `LeRobot`; `None` if the folder is none.

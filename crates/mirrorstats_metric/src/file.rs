@@ -29,6 +29,8 @@ const KIND: FileKind = FileKind {
         ("evidence", include_str!("../../../assets/definitions/evidence.toml")),
         ("reach", include_str!("../../../assets/definitions/reach.toml")),
         ("reach-fallback", include_str!("../../../assets/definitions/reach-fallback.toml")),
+        ("robots", include_str!("../../../examples/domains/robots.toml")),
+        ("tools", include_str!("../../../examples/domains/tools.toml")),
     ],
     largest: Limit::new("bytes of a definition file", 1 << 20),
     most_keys: Limit::new("keys in a definition file", 10_000),

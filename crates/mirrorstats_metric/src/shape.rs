@@ -22,6 +22,8 @@ pub struct DefinitionFile {
     pub open: Option<bool>,
     /// The subject of the traces: `mirror`, or any other name, for which the mirror's columns have no meaning.
     pub domain: Option<String>,
+    /// How other programs' files become such traces; `mirrorstats import` reads it.
+    pub import: Option<serde_json::Map<String, serde_json::Value>>,
     /// Columns of your own traces that expressions use.
     #[serde(default)]
     pub column: IndexMap<String, ColumnShape>,

@@ -34,7 +34,9 @@ impl ExpectedTraces {
     pub(crate) fn of(name: &Path) -> Result<Self, StudyError> {
         let definitions = Definitions::load(name, &schema_columns())?;
         let is_built_in = name.to_str().is_some_and(|name| file::built_in(name).is_some());
-        let carried = (!is_built_in).then(|| Carried::of(&definitions));
+        // Commands look for those of the mirror by the names of experiments.
+        let is_known = is_built_in && definitions.catalog.domain.is_none();
+        let carried = (!is_known).then(|| Carried::of(&definitions));
         Ok(Self { carried, ..Self::by(&definitions) })
     }
 

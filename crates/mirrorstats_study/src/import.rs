@@ -1,8 +1,9 @@
-//! Makes traces from JSON lines, given the experiments that definitions know.
+//! Makes traces of other programs' files, given the experiments that definitions know.
 
 use std::borrow::Cow;
-use std::fmt;
+use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
+use std::{fmt, slice};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -10,18 +11,27 @@ use serde::Serialize;
 use crate::StudyError;
 use crate::error::kinds;
 use crate::findings::ExpectedTraces;
+use crate::inputs::{InputError, ScoreFile};
+use crate::own_definitions::DEFAULT_DEFINITIONS;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::input;
-use mirrorstats_import::{Limits, Text};
+use mirrorstats_exact::replace::TemporaryFolder;
+use mirrorstats_import::{ImportError, Limits, Mapping, MappingError, Notes, Text};
+use mirrorstats_metric::file;
+use mirrorstats_score::tables::columns::KEYS;
 use mirrorstats_trace::footers::declared::Cluster;
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::schema::Kind;
+use mirrorstats_trace::read::open::TraceFile;
 use mirrorstats_trace::schema::colors::palette::Palette;
+use mirrorstats_trace::schema::{Kind, RECORDING_KEY};
 
 /// A colour takes only a few bytes.
 const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
+
+/// The bytes of a file that tell whether it is a log.
+const HEAD: u64 = 64 << 10;
 
 #[derive(Debug, thiserror::Error)]
 #[error("--palette {typed}: {words}")]
@@ -30,7 +40,7 @@ pub(crate) struct PaletteError {
     words: String,
 }
 
-kinds! { Argument: PaletteError; }
+kinds! { Argument: PaletteError; Definitions: MappingError; }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
@@ -91,6 +101,83 @@ pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAns
         columns: imported.columns.into_iter().map(str::to_owned).collect(),
         own_columns: own.collect(),
     })
+}
+
+/// Traces of the logs among inputs. Their files exist as long as this value.
+#[derive(Debug)]
+pub struct Logs {
+    folder: TemporaryFolder,
+    /// The name of the first log, and how many there are.
+    name: String,
+    /// What was left out of the logs, and how often.
+    pub notes: Vec<String>,
+}
+
+impl Logs {
+    /// Makes one trace of all logs among the inputs, in whose place it comes: files of other formats than Parquet that
+    /// hold no scores, and, if the definitions have `[import]`, Parquet files without a footer of ours. `None` if there
+    /// is no log. Errors: as [`import`].
+    pub fn of(inputs: &mut Vec<Input>, definitions: Option<&Path>) -> Result<Option<Self>, StudyError> {
+        let own = definitions.filter(|name| name.to_str().is_none_or(|name| file::built_in(name).is_none()));
+        let mapping = own.map(Mapping::of_definitions).transpose()?.flatten();
+        let (logs, mut others): (Vec<Input>, Vec<Input>) =
+            inputs.drain(..).partition(|input| is_log(input, mapping.is_some()));
+        let Some(first) = logs.first() else {
+            *inputs = others;
+            return Ok(None);
+        };
+        let name = match logs.len() {
+            1 => format!("{} (imported)", first.name),
+            count => format!("{} and {} more (imported)", first.name, count - 1),
+        };
+        let unreadable = |error: io::Error| InputError::unreadable(first, error);
+        let folder = TemporaryFolder::private("logs").map_err(unreadable)?;
+        let mut notes = Notes::default();
+        let mapping = mapping.unwrap_or_default();
+        let text = |input: &Input| {
+            let mut text = Text::open(&input.path)?;
+            text.read(&mapping, None, &mut notes).map(|()| text)
+        };
+        let texts = logs.iter().map(text).collect::<Result<Vec<_>, ImportError>>()?;
+        let out = folder.path().join("logs.parquet");
+        let definitions = definitions.unwrap_or(Path::new(DEFAULT_DEFINITIONS)).to_owned();
+        import(texts, &ImportRequest { out: out.clone(), definitions, ..ImportRequest::default() })?;
+        others.push(Input { name: name.clone(), path: out });
+        others.sort();
+        *inputs = others;
+        Ok(Some(Self { folder, name, notes: notes.texts() }))
+    }
+}
+
+/// Returns true if another program wrote the file. What cannot be told from its first bytes is left to the reader of
+/// traces and scores.
+fn is_log(input: &Input, has_mapping: bool) -> bool {
+    let Ok(file) = input::open(&input.path) else { return false };
+    let mut head = Vec::new();
+    if file.take(HEAD).read_to_end(&mut head).is_err() {
+        return false;
+    }
+    let name = input.name.to_ascii_lowercase();
+    if head.starts_with(b"PAR1") {
+        let is_ours = |file: TraceFile| file.metadata_value(RECORDING_KEY).is_some();
+        return has_mapping
+            && ScoreFile::all(slice::from_ref(input)).is_ok_and(|scores| scores.is_none())
+            && !TraceFile::open(input).is_ok_and(is_ours);
+    }
+    let is_compressed =
+        [&b"PK\x03\x04"[..], b"\x1f\x8b", b"\x28\xb5\x2f\xfd"].iter().any(|mark| head.starts_with(mark));
+    let text = head.trim_ascii_start();
+    let first = text.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    let is_json = text.starts_with(b"{") || text.starts_with(b"[");
+    let is_table = [".csv", ".tsv"].iter().any(|ending| name.ends_with(ending));
+    // The same columns tell scores in Parquet from steps.
+    let has = |column: &str| {
+        let named = if is_json { format!("\"{column}\"") } else { column.to_owned() };
+        let cells = first.split(|byte| if is_json { b" ,{:".contains(byte) } else { b",\t\r\"".contains(byte) });
+        cells.into_iter().any(|cell| cell == named.as_bytes())
+    };
+    let holds_scores = KEYS.iter().all(|key| has(key)) && !has("t");
+    is_compressed || ((is_json || is_table) && !holds_scores)
 }
 
 /// The palette in an argument or in the file that it names. A text with a comma is never a file name.

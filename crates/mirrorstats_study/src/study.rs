@@ -8,6 +8,7 @@ use std::thread;
 use crate::StudyError;
 use crate::caveats::undecided;
 use crate::empty_filter::{self, EmptyFilter};
+use crate::import::Logs;
 use crate::inputs::{self, InputError, Source, Stamp, resolve};
 use crate::limits::check_comparisons;
 use crate::losses::{self, Counted};
@@ -39,6 +40,8 @@ pub struct Study {
     pub question: Question,
     pub(crate) threads: NonZeroUsize,
     pub(crate) plan: Option<RegisteredPlan>,
+    /// The traces of logs, which exist as long as the study.
+    pub logs: Option<Logs>,
 }
 
 /// The counted episodes of a study and their cells, from which answers are made.
@@ -67,7 +70,14 @@ impl Study {
             // Problems with definitions are reported with the answer: the caller may set others first.
             question = question.clone().resolved(traces).unwrap_or(question);
         }
-        Ok(Self { inputs, stamps, source, question, threads, plan: None })
+        Ok(Self { inputs, stamps, source, question, threads, plan: None, logs: None })
+    }
+
+    /// Opens these files, with a trace in place of other programs' logs. The definitions say how logs are read; those of
+    /// the paper if absent. Errors: as [`Study::of`], and as `import` for logs.
+    pub fn with_logs(mut inputs: Vec<Input>, definitions: Option<&Path>) -> Result<Self, StudyError> {
+        let logs = Logs::of(&mut inputs, definitions)?;
+        Ok(Self { logs, ..Self::of(inputs)? })
     }
 
     /// Sets the definitions: `paper`, `extended`, or the path of a TOML file. Errors: a file that cannot be read; every

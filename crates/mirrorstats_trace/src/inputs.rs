@@ -1,6 +1,6 @@
 //! Resolves TRACES arguments to a sorted list of distinct files, with names that are the same on any machine.
 //!
-//! An argument is a file, a folder (with every `*.parquet` below it), a glob that the shell did not expand, or `-` for
+//! An argument is a file, a folder (with every `*.parquet` below it, or else the logs in it), a glob that the shell did not expand, or `-` for
 //! a list of files and folders on standard input, one per line. An existing name is taken literally, whatever its
 //! characters. Inside a folder, links to folders are not followed. Reports and names that begin with `_` or `.` are
 //! skipped: other programs leave such files beside their Parquet.
@@ -84,7 +84,9 @@ fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
     let path = Path::new(argument);
     if path.exists() {
         let help = "name the folder that the recorder wrote to";
-        return some(traces_at(path)?, "a folder without any *.parquet in it", help);
+        let traces = traces_at(path)?;
+        let files = if traces.is_empty() { logs_in(path)? } else { traces };
+        return some(files, "a folder without any *.parquet in it", help);
     }
     // A pattern is text; other bytes can only be a name.
     let Some(pattern) = argument.to_str().filter(|text| is_glob(text)) else {
@@ -157,6 +159,21 @@ pub fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
         }
     }
     Ok(traces)
+}
+
+/// Endings of logs of other programs.
+const LOGS: [&str; 4] = ["csv", "eval", "jsonl", "tsv"];
+
+/// The logs in a folder without traces; not the lists that mirrorstats writes beside traces.
+fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
+    let failed = |source| TraceError::Read { what: folder.display().to_string(), source };
+    let paths = fs::read_dir(folder).map_err(failed)?.map(|entry| Ok(entry.map_err(failed)?.path()));
+    let is_list = |path: &PathBuf| ["lost.jsonl", "labels.jsonl"].iter().any(|name| path.ends_with(name));
+    let has_ending = |path: &PathBuf| path.extension().is_some_and(|ending| LOGS.iter().any(|log| ending == *log));
+    let is_log = |path: &Result<PathBuf, TraceError>| {
+        path.as_ref().map_or(true, |path| has_ending(path) && !is_list(path) && path.is_file())
+    };
+    paths.filter(is_log).collect()
 }
 
 /// Returns true if `mirrorstats report` wrote the folder: its Parquet file holds scores, not steps.

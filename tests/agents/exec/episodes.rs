@@ -26,15 +26,14 @@ fn a_program_gets_its_task_each_observation_and_the_end() {
     let kinds: Vec<&str> = heard.iter().map(|line| line["kind"].as_str().unwrap()).collect();
     assert_eq!(kinds, [vec!["task"], vec!["observation"; 20], vec!["end"]].concat());
     let (task, end) = (&heard[0], &heard[21]);
-    assert_eq!(task["episode_id"], "E3/my-agent/s1/r1");
-    assert_eq!(
-        (&task["experiment"], &task["family"], &task["max_steps"]),
-        (&"E3".into(), &"cube_selection".into(), &20.into())
-    );
+    assert_eq!((&task["family"], &task["max_steps"]), (&"cube_selection".into(), &20.into()));
     let stated = task["stated_color"].as_str().unwrap();
     assert!(task["system_prompt"].as_str().unwrap().starts_with(&format!("You are a {stated} robot.")));
     assert_eq!(task["reply_schema"], reply::structure(&Experiment::E1));
-    assert_eq!((&end["reason"], &end["steps"]), (&"budget".into(), &20.into()));
+    assert_eq!(
+        (&end["episode_id"], &end["reason"], &end["steps"]),
+        (&"E3/my-agent/s1/r1".into(), &"budget".into(), &20.into())
+    );
 
     let [first, second] = [&heard[1], &heard[2]];
     assert_eq!((&first["t"], &first["remaining_steps"], &first["last_action"]), (&1.into(), &20.into(), &Value::Null));
@@ -59,10 +58,12 @@ fn no_message_reveals_the_truth() {
     let keys: BTreeSet<&str> =
         heard.iter().flat_map(|line| line.as_object().unwrap().keys()).map(String::as_str).collect();
     // Anything added to the messages needs a decision here.
-    let known = "episode_id experiment family image kind last_action last_thought max_steps orientation position protocol \
+    let known = "episode_id family image kind last_action last_thought max_steps orientation position protocol \
                  reason remaining_steps reply_schema seed stated_color steps system_prompt t user_prompt wall_warning";
     assert_eq!(keys, known.split_whitespace().collect());
     for line in &heard {
+        // The id has the seed and the run, from which colours can be computed.
+        assert_eq!(line.get("episode_id").is_some(), line["kind"] == "end");
         assert_eq!(line.get("stated_color").unwrap_or(&Value::Null), &Value::Null);
         for words in ["system_prompt", "user_prompt"].iter().filter_map(|key| line.get(key)) {
             assert!(!words.as_str().unwrap().contains(&body), "{words}");

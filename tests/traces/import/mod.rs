@@ -1,6 +1,7 @@
 //! `mirrorstats import` at the process boundary: valid input becomes a trace, and nothing else does.
 
 mod formats;
+mod guess;
 #[cfg(feature = "polars")]
 mod inspect;
 #[cfg(feature = "polars")]

@@ -13,6 +13,7 @@ use crate::prompt::{self, Prompt, Rendered};
 use crate::reply::{self, Ending};
 use crate::secrets::Secret;
 use crate::{Ended, Lost, Observation, Reply, Task, Usage};
+use mirrorstats_exact::hash;
 use mirrorstats_exact::replace::TemporaryFolder;
 
 #[derive(Debug)]
@@ -55,15 +56,12 @@ impl Conversation {
     }
 
     fn task_message(&self, system_prompt: String) -> Message {
-        let experiment = self.episode_id.split('/').next().unwrap_or_default().to_owned();
         Message::Task(TaskMessage {
             protocol: PROTOCOL,
-            episode_id: self.episode_id.clone(),
-            experiment,
             family: self.task.experiment.prompt.replace('-', "_"),
             stated_color: self.task.stated_color.clone(),
             max_steps: self.task.step_budget,
-            seed: self.task.seed,
+            seed: hashed(self.task.seed),
             system_prompt,
             reply_schema: reply::structure(&self.task.experiment),
         })
@@ -90,7 +88,7 @@ impl Conversation {
     }
 
     pub(crate) fn end(&self, reason: Ended) -> Message {
-        Message::End(EndMessage { reason, steps: self.steps })
+        Message::End(EndMessage { episode_id: self.episode_id.clone(), reason, steps: self.steps })
     }
 
     pub(crate) fn read(&self, text: &str, ending: Ending, usage: Usage) -> Reply {
@@ -101,6 +99,12 @@ impl Conversation {
     pub(crate) fn without_secrets(&self, text: &str) -> String {
         without(&self.secrets, text)
     }
+}
+
+/// A seed that does not say which scene it belongs to.
+fn hashed(seed: u64) -> u64 {
+    let hash = hash::of_bytes(&[b"mirrorstats agent seed ", &seed.to_le_bytes()[..]].concat());
+    u64::from_str_radix(&hash[..16], 16).expect("hexadecimal digits")
 }
 
 fn kept(folder: &Path, t: i32, png: &[u8]) -> Result<String, Lost> {

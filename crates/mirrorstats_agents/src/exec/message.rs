@@ -11,7 +11,7 @@
 //! ```
 //!
 //! Rule: what a model behind a provider gets, and nothing else: no body's true colour, no pose of another body, no count
-//! of pixels. The episode's id and experiment are for the program's own records.
+//! of pixels, and before the end no seed or run, from which colours could be computed.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -40,17 +40,14 @@ pub enum Message {
 pub struct TaskMessage {
     /// The version of this protocol.
     pub protocol: u32,
-    /// The episode's id, for the program's own records.
-    pub episode_id: String,
-    /// The experiment, for the program's own records.
-    pub experiment: String,
     /// The prompt: `cube_selection` or `exploration` for the paper's two, the name of its folder for another.
     pub family: String,
     /// The false colour that the prompt states in E3; null elsewhere.
     pub stated_color: Option<String>,
     /// Steps after which the episode ends automatically.
     pub max_steps: i32,
-    /// A number to draw chances from: differs between episodes, is the same in every recording of an episode.
+    /// A number to draw chances from: differs between episodes, is the same in every recording of an episode. It is a
+    /// hash, so it does not say which scene this is.
     pub seed: u64,
     /// The system prompt that a model gets.
     pub system_prompt: String,
@@ -101,8 +98,10 @@ pub enum Image {
 }
 
 /// That nothing more is asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct EndMessage {
+    /// The episode's id, for the program's own records: with its experiment, seed and run.
+    pub episode_id: String,
     /// The ending of the episode.
     pub reason: Ended,
     /// The steps that were asked for.

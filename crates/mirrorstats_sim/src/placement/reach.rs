@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::super::config::WorldConfig;
 use super::super::floor::FloorPlan;
-use super::super::scene::{Cube, Scene};
+use super::super::scene::{Cube, HungPane, MirrorPlace, Scene};
 use mirrorstats_experiment::spec::Cubes;
 
 /// The distance between points of the floor's lattice, m.
@@ -26,7 +26,8 @@ const ENOUGH: f64 = 0.75;
 pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
     let near = within(config, scene, f64::from(config.episode.steps) / 3.0).map(|at| spot(scene, at));
     let near: Vec<[f64; 2]> = near.collect();
-    let shares: Vec<f64> = near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect();
+    let mirror = Glass { place: scene.mirror, width: config.mirror.width, bottom: 0.0, top: f64::INFINITY };
+    let shares: Vec<f64> = near.iter().filter_map(|spot| share_shown(config, scene, mirror, *spot)).collect();
     let hidden = shares.iter().filter(|share| **share <= 0.5).count();
     let has_clutter = matches!(scene.experiment.layout.cubes, Cubes::Clutter { .. }) && !scene.cubes.is_empty();
     let reaches =
@@ -49,28 +50,48 @@ pub(crate) fn reachable(config: &WorldConfig, scene: &Scene) -> Vec<[f64; 2]> {
     found.filter(|at| at.iter().all(|at| at % 2 == 0)).map(|at| spot(scene, at)).collect()
 }
 
-/// Returns true if an agent here that faces the mirror squarely sees enough of its body.
-pub(super) fn is_clear(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> bool {
-    share_shown(config, scene, spot).is_some_and(|share| share >= ENOUGH)
+/// What a place before a mirror depends on: lengths in m, heights above the floor.
+#[derive(Clone, Copy)]
+struct Glass {
+    place: MirrorPlace,
+    width: f64,
+    bottom: f64,
+    top: f64,
 }
 
-/// The share of its body that an agent here sees when it faces the mirror squarely; `None` if the place is not before
-/// the mirror, or too far from it.
-fn share_shown(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> Option<f64> {
-    let mirror = scene.mirror;
-    let away = mirror.distance(spot, config);
-    let is_before = mirror.aside(spot).abs() <= config.mirror.width / 2.0 - 0.3 && away <= NEAR_ENOUGH;
-    let points = || ACROSS.into_iter().flat_map(|across| HEIGHTS.into_iter().map(move |height| [across, height]));
-    let hides = |cube: &Cube, point: [f64; 2]| is_hidden(config, scene, cube, spot, point);
-    let shown = || points().filter(|point| !scene.cubes.iter().any(|cube| hides(cube, *point))).count();
+/// Returns true if an agent here that faces this pane squarely sees enough of its body, or of the part that a small pane
+/// can show at all.
+pub(super) fn is_clear(config: &WorldConfig, scene: &Scene, pane: &HungPane, spot: [f64; 2]) -> bool {
+    let [bottom, top] = [-0.5, 0.5].map(|half| pane.center_height + half * pane.height);
+    let glass = Glass { place: pane.place, width: pane.width, bottom, top };
+    share_shown(config, scene, glass, spot).is_some_and(|share| share >= ENOUGH)
+}
+
+/// The share of the points of its body in the mirror that no cube hides from an agent here that faces it squarely;
+/// `None` if the place is not before the mirror, or too far from it, or if the mirror is too high or too low.
+fn share_shown(config: &WorldConfig, scene: &Scene, glass: Glass, spot: [f64; 2]) -> Option<f64> {
+    let away = glass.place.distance(spot, config);
+    let within = (glass.width / 2.0 - 0.3).max(0.1);
+    let is_before = glass.place.aside(spot).abs() <= within && away <= NEAR_ENOUGH;
+    // A point is seen in the plane of the mirror half-way between its height and that of the eye.
+    let is_in = |height: &f64| (glass.bottom..=glass.top).contains(&f64::midpoint(*height, config.eye.height));
+    let heights = HEIGHTS.into_iter().filter(is_in);
+    let points: Vec<_> = heights.flat_map(|height| ACROSS.map(|across| [across, height])).collect();
+    let is_hidden = |point| scene.cubes.iter().any(|cube| is_hidden(config, glass.place, cube, spot, point));
+    let shown = points.iter().filter(|point| !is_hidden(**point)).count();
     #[expect(clippy::cast_precision_loss, reason = "a few points")]
-    is_before.then(|| shown() as f64 / points().count() as f64)
+    (is_before && !points.is_empty()).then(|| shown as f64 / points.len() as f64)
 }
 
 /// Returns true if a cube hides the point of the body at this place across it and this height from an agent who looks
 /// into the mirror. It may be on the way to the mirror or back.
-fn is_hidden(config: &WorldConfig, scene: &Scene, cube: &Cube, spot: [f64; 2], [across, height]: [f64; 2]) -> bool {
-    let mirror = scene.mirror;
+fn is_hidden(
+    config: &WorldConfig,
+    mirror: MirrorPlace,
+    cube: &Cube,
+    spot: [f64; 2],
+    [across, height]: [f64; 2],
+) -> bool {
     let (away, depth) = (mirror.distance(spot, config), mirror.distance([cube.x, cube.y], config));
     let aside = mirror.aside([cube.x, cube.y]) - mirror.aside(spot);
     let eye = config.eye.height;

@@ -9,6 +9,7 @@ use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::changes::Changes;
 use mirrorstats_score::cells::group::DEFAULT_BY;
 use mirrorstats_study::diff::{DiffRequest, Side, diff};
+use mirrorstats_study::import::Logs;
 use mirrorstats_study::inputs::resolve;
 
 /// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
@@ -51,7 +52,9 @@ pub struct DiffArgs {
 impl DiffArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
-        let traces = resolve(&self.traces, io::stdin().lock())?;
+        let mut traces = resolve(&self.traces, io::stdin().lock())?;
+        let logs = Logs::of(&mut traces, Some(&self.new))?;
+        output::notes(logs.as_ref().map_or(&[][..], |logs| &logs.notes));
         output::note_stale_checksums(&traces);
         let found = diff(&old, &new, &traces, &self.request())?;
         output::notes(&found.notes);

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::escape::visible;
+use mirrorstats_study::import::Logs;
 use mirrorstats_study::question::Question;
 use mirrorstats_trace::beside::label_line::check_coder;
 use mirrorstats_trace::inputs;
@@ -64,17 +65,20 @@ pub struct ViewArgs {
 
 impl ViewArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
+        let mut inputs = inputs::resolve(&self.runs, io::empty()).unwrap_or_default();
+        // They exist until the server ends.
+        let logs = Logs::of(&mut inputs, self.scoring.definitions.as_deref())?;
+        output::notes(logs.as_ref().map_or(&[][..], |logs| &logs.notes));
+        let of_logs = || inputs.iter().map(|input| input.path.clone().into()).collect();
         let options = Options {
-            runs: self.runs.clone(),
+            runs: if logs.is_some() { of_logs() } else { self.runs.clone() },
             question: Question { each: true, ..self.scoring.question(&self.grouping) },
             against: self.against.clone(),
             style: self.style.clone(),
             coder: self.label.clone(),
             threads: self.threads.count(),
         };
-        if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
-            output::note_stale_checksums(&inputs);
-        }
+        output::note_stale_checksums(&inputs);
         if let (Some(folder), None) = (&self.export, &self.episode) {
             return Self::export_all(&options, folder);
         }

@@ -44,7 +44,7 @@ impl CheckArgs {
             return Err(Failure::input(words));
         }
         let limits = QualityLimits { max_unreadable: self.max_unreadable, max_lost: self.max_lost };
-        let study = self.traces.open()?;
+        let study = self.traces.open(None)?;
         let cells = quality::quality(&study)?;
         let design = if self.design { Some(design_audit(&study.grouped()?)?) } else { None };
         let answer = QualityCheckAnswer::of(&cells, limits, design);

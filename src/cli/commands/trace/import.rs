@@ -4,9 +4,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::cli::{Failure, Outcome, output};
-use mirrorstats_exact::replace;
-use mirrorstats_import::{Format, Mapping, Notes, Text};
+use mirrorstats_exact::replace::{self, TemporaryFolder};
+use mirrorstats_import::{Draft, Format, Mapping, Notes, Text, guess};
+use mirrorstats_study::Study;
 use mirrorstats_study::import::{ImportRequest, import};
+use mirrorstats_study::report::{ReportOptions, report};
+use mirrorstats_trace::inputs::Input;
 
 /// Make a trace of another harness's steps or logs
 ///
@@ -24,8 +27,11 @@ pub struct ImportArgs {
     #[arg(long, value_name = "FORMAT|FILE.toml")]
     from: Option<PathBuf>,
     /// The trace to write
-    #[arg(short, long, value_name = "TRACE.parquet")]
-    out: PathBuf,
+    #[arg(short, long, value_name = "TRACE.parquet", required_unless_present = "guess")]
+    out: Option<PathBuf>,
+    /// Draft the mapping and the definitions of one file, with a first table; say what the draft rests on
+    #[arg(long, conflicts_with_all = ["out", "from", "map", "set", "json", "palette", "cluster", "reconstruction"])]
+    guess: bool,
     /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     definitions: PathBuf,
@@ -54,7 +60,8 @@ pub struct ImportArgs {
 
 impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        self.check_places()?;
+        let Some(out) = &self.out else { return self.draft() };
+        self.check_places(out)?;
         let (from, file) = self.from.as_deref().map_or((None, None), format_or_file);
         let mapping = Mapping::parse(file, &self.map, &self.set)?;
         let mut notes = Notes::default();
@@ -62,7 +69,7 @@ impl ImportArgs {
             self.steps.iter().map(|path| text(path, from, &mapping, &mut notes)).collect::<Result<Vec<_>, _>>()?;
         output::notes(&notes.texts());
         let request = ImportRequest {
-            out: self.out.clone(),
+            out: out.clone(),
             definitions: self.definitions.clone(),
             palette: self.palette.clone(),
             clusters_by_seed: self.cluster.is_some(),
@@ -71,14 +78,36 @@ impl ImportArgs {
         output::print(&import(texts, &request)?, self.json)
     }
 
-    fn check_places(&self) -> Result<(), Failure> {
+    fn draft(&self) -> Result<Outcome, Failure> {
+        let [file] = &*self.steps else {
+            let words = format!("--guess: expected one file, found {}\n  help: name one of them", self.steps.len());
+            return Err(Failure::input(words));
+        };
+        let Draft { text, reasons } = guess(file).map_err(Failure::input)?;
+        let table = first_table(file, &text)?;
+        output::notes(&reasons);
+        output::plain(table.lines().fold(text, |text, line| format!("{text}\n# {line}").trim_end().to_owned()) + "\n")
+    }
+
+    fn check_places(&self, out: &Path) -> Result<(), Failure> {
         if self.steps.iter().filter(|path| is_standard_input(path)).count() > 1 {
             let words = "`-`: expected standard input once, found it twice\n  help: name it once";
             return Err(Failure::input(words));
         }
-        replace::check_target(&self.out, &self.steps, "the steps themselves")?;
-        output::check_target(&self.out, [&self.definitions].into_iter().chain(&self.palette))
+        replace::check_target(out, &self.steps, "the steps themselves")?;
+        output::check_target(out, [&self.definitions].into_iter().chain(&self.palette))
     }
+}
+
+/// What `report` prints for the file under the draft.
+fn first_table(file: &Path, draft: &str) -> Result<String, Failure> {
+    let folder = TemporaryFolder::private("draft").map_err(Failure::input)?;
+    let definitions = folder.path().join("draft.toml");
+    std::fs::write(&definitions, draft).map_err(Failure::input)?;
+    let study = Study::with_logs(vec![Input::new(file)], Some(&definitions))?.definitions(&definitions)?;
+    let report = report(&study, &ReportOptions { figures: false, ..ReportOptions::default() })?;
+    let tables = report.main_table().into_iter().chain(report.other_table());
+    Ok(tables.map(|table| table.printed().markdown()).collect())
 }
 
 /// The format with this name, or the file of a mapping.

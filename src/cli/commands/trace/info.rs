@@ -23,7 +23,7 @@ pub struct InfoCommand {
 
 impl InfoCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let study = self.input.open()?;
+        let study = self.input.open(None)?;
         let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
         output::notes(&by_others(study.traces()?.files()));
         let info = info(study.traces()?, listing, self.input.threads.count())?;

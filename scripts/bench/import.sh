@@ -16,6 +16,6 @@ fi
 cargo build --release --bin mirrorstats
 echo "mirrorstats import, $samples samples:"
 /usr/bin/time -f "%e s, %M kB" "$target/release/mirrorstats" import "$log" -o "$folder/tools.parquet" \
-  --definitions examples/domains/tools.toml --map right_tool=sample.metadata.right_tool
+  --definitions examples/domains/tools.toml
 echo "inspect log dump, $samples samples:"
 /usr/bin/time -f "%e s, %M kB" python3 -c "from inspect_ai._cli.main import main; main()" log dump "$log" >/dev/null

@@ -78,10 +78,15 @@ impl From<Fault> for ImportError {
 fn listed(faults: &[Fault], more: usize) -> String {
     let lacks = |column: &str| faults.iter().any(|fault| fault.key.as_deref() == Some(column) && fault.found == "none");
     let is_other = OF_MIRRORS.into_iter().all(lacks);
-    let cause = is_other.then(|| {
-        let columns = OF_MIRRORS.map(|column| format!("`{column}`")).join(", ");
+    let is_nested = faults.iter().any(|fault| fault.found == "an object");
+    let found = if is_other {
+        format!("none of {}", OF_MIRRORS.map(|column| format!("`{column}`")).join(", "))
+    } else {
+        "objects in its rows".to_owned()
+    };
+    let cause = (is_other || is_nested).then(|| {
         format!(
-            "this looks like another domain: expected columns of the domain `mirror`, found none of {columns}\n  \
+            "this looks like another domain: expected columns of the domain `mirror`, found {found}\n  \
              help: `mirrorstats import --guess FILE` drafts its mapping and definitions; see docs/how-to/domains.md\n"
         )
     });
@@ -89,7 +94,8 @@ fn listed(faults: &[Fault], more: usize) -> String {
     // A value that is there says more than one that is missing.
     let (missing, wrong): (Vec<&Fault>, Vec<&Fault>) =
         faults.iter().filter(of_mirror).partition(|it| it.found == "none");
-    let shown: Vec<String> = wrong.into_iter().chain(missing).take(SHOWN).map(ToString::to_string).collect();
+    let shown: Vec<String> =
+        wrong.into_iter().chain(missing).take(if is_nested { 1 } else { SHOWN }).map(ToString::to_string).collect();
     let more = more + faults.len() - shown.len();
     let more = if more == 0 { String::new() } else { format!("\nand {more} more; nothing was written") };
     format!("{}{}{more}", cause.unwrap_or_default(), shown.join("\n"))

@@ -443,7 +443,7 @@ impl Drafting {
             let kind = if words.is_some() { Kind::Bool } else { found };
             let decimals = (kind == Kind::Float).then(|| decimals(values));
             let unit = UNITS.iter().find(|(ending, _)| name.to_ascii_lowercase().ends_with(ending));
-            let _ = write!(columns, "\n[column.{name}]\ntype = {}\n", quoted(kind.name()));
+            let _ = write!(columns, "\n[column.{name}]\ntype = \"{}\"\n", type_of(kind));
             if let Some((digits, is_rounded)) = decimals {
                 let more = if is_rounded { " # its values have more; they are rounded" } else { "" };
                 let _ = writeln!(columns, "decimals = {digits}{more}");
@@ -498,6 +498,16 @@ fn title(name: &str, ending: Option<&str>) -> String {
     let words = name.replace('_', " ");
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// The name of a type in definitions.
+const fn type_of(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Bool => "bool",
+        Kind::Int => "int",
+        Kind::Float => "float",
+        Kind::String | Kind::Unsupported => "text",
+    }
 }
 
 /// The type that fits all values; `None` for lists, and if all are null.

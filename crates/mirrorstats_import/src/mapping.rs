@@ -34,6 +34,8 @@ pub struct Mapping {
     columns: IndexMap<String, Source>,
     /// True if an entry whose path is not in a table gives no column, instead of nulls.
     is_built_in: bool,
+    /// True if it was in a definition file, whose steps may come from other formats too.
+    is_of_definitions: bool,
 }
 
 /// A file with a mapping. It may be a definition file, whose other tables are read there.
@@ -120,6 +122,13 @@ pub struct MappingError {
     found: String,
 }
 
+impl MappingError {
+    fn of_file(path: &FilePath, found: &str) -> Self {
+        let expected = "a format, or a mapping file with `[import]`";
+        Self { place: Input::new(path).name, expected, found: found.trim_end().into() }
+    }
+}
+
 /// What was left out, and how often.
 #[derive(Clone, Debug, Default)]
 pub struct Notes {
@@ -152,9 +161,14 @@ impl Notes {
 }
 
 impl Mapping {
-    /// The mapping in this file, if there is one, with columns from `COLUMN=PATH` and constants from `COLUMN=VALUE`.
-    pub fn parse(file: Option<&FilePath>, columns: &[String], constants: &[String]) -> Result<Self, MappingError> {
-        let mut mapping = file.map(Self::read).transpose()?.unwrap_or_default();
+    /// The mapping in this file, or else this one, with columns from `COLUMN=PATH` and constants from `COLUMN=VALUE`.
+    pub fn parse(
+        file: Option<&FilePath>,
+        other: Option<Self>,
+        columns: &[String],
+        constants: &[String],
+    ) -> Result<Self, MappingError> {
+        let mut mapping = file.map(Self::read).transpose()?.or(other).unwrap_or_default();
         for typed in columns {
             let (name, path) = pair(typed, "COLUMN=PATH")?;
             mapping.columns.insert(name.clone(), Source::Value(Path::parse(&path), Change::default()));
@@ -169,20 +183,17 @@ impl Mapping {
         Ok(mapping)
     }
 
-    /// The mapping in a definition file; `None` without the table `[import]`. What else is wrong with the file is left to
-    /// the reader of definitions.
-    pub fn of_definitions(path: &FilePath) -> Result<Option<Self>, MappingError> {
-        let text = input::text(path, LARGEST_FILE).unwrap_or_default();
-        let has_one = toml::from_str::<toml::Table>(&text).is_ok_and(|file| file.contains_key("import"));
-        has_one.then(|| Self::read(path)).transpose()
+    /// The mapping in the text of a definition file; `None` without the table `[import]`. What else is wrong with the file
+    /// is left to the reader of definitions.
+    pub fn of_definitions(path: &FilePath, text: &str) -> Result<Option<Self>, MappingError> {
+        let has_one = toml::from_str::<toml::Table>(text).is_ok_and(|file| file.contains_key("import"));
+        let read = || Self::of_text(text).map_err(|found| MappingError::of_file(path, &found));
+        has_one.then(|| Ok(Self { is_of_definitions: true, ..read()? })).transpose()
     }
 
     fn read(path: &FilePath) -> Result<Self, MappingError> {
         let text = input::text(path, LARGEST_FILE).map_err(|error| error.to_string());
-        text.and_then(|text| Self::of_text(&text)).map_err(|found| {
-            let expected = "a format, or a mapping file with `[import]`";
-            MappingError { place: Input::new(path).name, expected, found: found.trim_end().into() }
-        })
+        text.and_then(|text| Self::of_text(&text)).map_err(|found| MappingError::of_file(path, &found))
     }
 
     pub(super) fn built_in(text: &str) -> Self {
@@ -201,8 +212,8 @@ impl Mapping {
             format: settings.format.as_ref().map(known).transpose()?,
             lists: List::all(&settings.rows)?,
             columns: settings.columns.iter().map(column).collect::<Result<_, _>>()?,
-            is_built_in: false,
             settings,
+            ..Self::default()
         })
     }
 
@@ -210,6 +221,11 @@ impl Mapping {
     pub(super) fn over(&self, mut other: Self) -> Self {
         other.columns.extend(self.columns.clone());
         other
+    }
+
+    /// Returns true if a file of this format is not the kind that the mapping of some definitions is for.
+    pub(super) fn is_for_another(&self, found: Format) -> bool {
+        self.is_of_definitions && self.format.is_some_and(|format| format.is_recognised() && format != found)
     }
 
     pub fn is_empty(&self) -> bool {

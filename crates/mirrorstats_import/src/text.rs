@@ -117,6 +117,8 @@ impl Text {
     pub fn read(&mut self, mapping: &Mapping, format: Option<Format>, notes: &mut Notes) -> Result<(), ImportError> {
         let head = self.head()?;
         let detect = || Format::detect(&self.name, &head, !mapping.lists.is_empty());
+        let plain = Mapping::default();
+        let mapping = if mapping.is_for_another(format.unwrap_or_else(detect)) { &plain } else { mapping };
         let format = format.or(mapping.format).unwrap_or_else(detect);
         let effective = format.mapping(&head).map(|built_in| mapping.over(built_in));
         let effective = effective.as_ref().unwrap_or(mapping);

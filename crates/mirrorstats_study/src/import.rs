@@ -28,7 +28,7 @@ use mirrorstats_trace::schema::colors::palette::Palette;
 use mirrorstats_trace::schema::{Kind, RECORDING_KEY};
 
 /// A colour takes only a few bytes.
-const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
+const LARGEST: Limit = Limit::new("bytes of a palette or of definitions", 1 << 20);
 
 /// The bytes of a file that tell whether it is a log.
 const HEAD: u64 = 64 << 10;
@@ -103,12 +103,18 @@ pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAns
     })
 }
 
+/// The mapping in these definitions, if they have one.
+pub fn mapping_in(definitions: &Path) -> Result<Option<Mapping>, StudyError> {
+    let built_in = definitions.to_str().and_then(file::built_in).map(Cow::Borrowed);
+    // A file that cannot be read is reported by the reader of definitions.
+    let text = built_in.or_else(|| input::text(definitions, LARGEST).ok().map(Cow::Owned));
+    Ok(Mapping::of_definitions(definitions, &text.unwrap_or_default())?)
+}
+
 /// Traces of the logs among inputs. Their files exist as long as this value.
 #[derive(Debug)]
 pub struct Logs {
-    folder: TemporaryFolder,
-    /// The name of the first log, and how many there are.
-    name: String,
+    _folder: TemporaryFolder,
     /// What was left out of the logs, and how often.
     pub notes: Vec<String>,
 }
@@ -118,8 +124,7 @@ impl Logs {
     /// hold no scores, and, if the definitions have `[import]`, Parquet files without a footer of ours. `None` if there
     /// is no log. Errors: as [`import`].
     pub fn of(inputs: &mut Vec<Input>, definitions: Option<&Path>) -> Result<Option<Self>, StudyError> {
-        let own = definitions.filter(|name| name.to_str().is_none_or(|name| file::built_in(name).is_none()));
-        let mapping = own.map(Mapping::of_definitions).transpose()?.flatten();
+        let mapping = definitions.map(mapping_in).transpose()?.flatten();
         let (logs, mut others): (Vec<Input>, Vec<Input>) =
             inputs.drain(..).partition(|input| is_log(input, mapping.is_some()));
         let Some(first) = logs.first() else {
@@ -142,10 +147,10 @@ impl Logs {
         let out = folder.path().join("logs.parquet");
         let definitions = definitions.unwrap_or(Path::new(DEFAULT_DEFINITIONS)).to_owned();
         import(texts, &ImportRequest { out: out.clone(), definitions, ..ImportRequest::default() })?;
-        others.push(Input { name: name.clone(), path: out });
+        others.push(Input { name, path: out });
         others.sort();
         *inputs = others;
-        Ok(Some(Self { folder, name, notes: notes.texts() }))
+        Ok(Some(Self { _folder: folder, notes: notes.texts() }))
     }
 }
 

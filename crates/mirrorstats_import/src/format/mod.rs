@@ -97,6 +97,11 @@ impl Format {
         }
     }
 
+    /// Returns true if contents alone tell the format.
+    pub(super) const fn is_recognised(self) -> bool {
+        !matches!(self, Self::JsonLines | Self::Json | Self::Csv | Self::Parquet)
+    }
+
     /// The mapping of the format, if it has one.
     pub(super) fn mapping(self, head: &[u8]) -> Option<Mapping> {
         let head = String::from_utf8_lossy(head);

@@ -7,7 +7,7 @@ use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::replace::{self, TemporaryFolder};
 use mirrorstats_import::{Draft, Format, Mapping, Notes, Text, guess};
 use mirrorstats_study::Study;
-use mirrorstats_study::import::{ImportRequest, import};
+use mirrorstats_study::import::{ImportRequest, import, mapping_in};
 use mirrorstats_study::report::{ReportOptions, report};
 use mirrorstats_trace::inputs::Input;
 
@@ -63,7 +63,7 @@ impl ImportArgs {
         let Some(out) = &self.out else { return self.draft() };
         self.check_places(out)?;
         let (from, file) = self.from.as_deref().map_or((None, None), format_or_file);
-        let mapping = Mapping::parse(file, &self.map, &self.set)?;
+        let mapping = Mapping::parse(file, mapping_in(&self.definitions)?, &self.map, &self.set)?;
         let mut notes = Notes::default();
         let texts =
             self.steps.iter().map(|path| text(path, from, &mapping, &mut notes)).collect::<Result<Vec<_>, _>>()?;

@@ -87,7 +87,7 @@ fn listed(faults: &[Fault], more: usize) -> String {
     let cause = (is_other || is_nested).then(|| {
         format!(
             "this looks like another domain: expected columns of the domain `mirror`, found {found}\n  \
-             help: `mirrorstats import --guess FILE` drafts its mapping and definitions; see docs/how-to/domains.md\n"
+             help: give --definitions a file that says `domain = \"NAME\"`; `mirrorstats import --guess FILE` drafts one\n"
         )
     });
     let of_mirror = |fault: &&Fault| !is_other || fault.found != "none" || fault.key.as_deref().is_none_or(is_general);

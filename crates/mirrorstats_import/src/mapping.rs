@@ -123,9 +123,8 @@ pub struct MappingError {
 }
 
 impl MappingError {
-    fn of_file(path: &FilePath, found: &str) -> Self {
-        let expected = "a format, or a mapping file with `[import]`";
-        Self { place: Input::new(path).name, expected, found: found.trim_end().into() }
+    fn of_file(place: String, found: &str) -> Self {
+        Self { place, expected: "a format, or a mapping file with `[import]`", found: found.trim_end().into() }
     }
 }
 
@@ -187,13 +186,14 @@ impl Mapping {
     /// is left to the reader of definitions.
     pub fn of_definitions(path: &FilePath, text: &str) -> Result<Option<Self>, MappingError> {
         let has_one = toml::from_str::<toml::Table>(text).is_ok_and(|file| file.contains_key("import"));
-        let read = || Self::of_text(text).map_err(|found| MappingError::of_file(path, &found));
+        let read = || Self::of_text(text).map_err(|found| MappingError::of_file(Input::new(path).name, &found));
         has_one.then(|| Ok(Self { is_of_definitions: true, ..read()? })).transpose()
     }
 
     fn read(path: &FilePath) -> Result<Self, MappingError> {
         let text = input::text(path, LARGEST_FILE).map_err(|error| error.to_string());
-        text.and_then(|text| Self::of_text(&text)).map_err(|found| MappingError::of_file(path, &found))
+        text.and_then(|text| Self::of_text(&text))
+            .map_err(|found| MappingError::of_file(format!("--from {}", Input::new(path).name), &found))
     }
 
     pub(super) fn built_in(text: &str) -> Self {

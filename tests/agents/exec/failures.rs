@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::Instant;
 
-use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
+use super::recordings::{Bench, FORWARD, done, outcome, seed_of, three_steps};
 use crate::harness::files::{assert_same, contents};
 use crate::harness::program::run;
 use crate::harness::traces::recording;
@@ -242,14 +242,13 @@ fn keys_of_the_environment_are_removed_from_program_output() {
 #[test]
 fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     let bench = Bench::new();
-    // An episode fails at its first step if the last run number in `heard.jsonl` matches `runs`.
-    let fails = |runs: &str| {
-        format!(
-            "case \"$line\" in *'\"t\":1,'*) grep -o '/r[0-9]*\"' heard.jsonl | tail -n 1 | grep -q '{runs}' && exit 7 ;; esac; {}",
-            three_steps()
-        )
+    // An episode fails at its first step if the last task in `heard.jsonl` is that of one of these runs.
+    let fails = |runs: &[u64]| {
+        let seeds: String = runs.iter().map(|run| format!(" -e '{}'", seed_of(1, *run))).collect();
+        let task = format!("grep '\"kind\":\"task\"' heard.jsonl | tail -n 1 | grep -q{seeds} && exit 7");
+        format!("case \"$line\" in *'\"t\":1,'*) {task} ;; esac; {}", three_steps())
     };
-    bench.program(&fails("[24]"));
+    bench.program(&fails(&[2, 4]));
     let words = ["--runs", "4", "--threads", "1"];
     // No word names the program's file, so a changed file is the same agent.
     let record = |words: &[&str]| bench.record_of("exec:sh -c '. ./program.sh'", words).output().unwrap();
@@ -265,7 +264,7 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     assert!(!validation.contains("lost.jsonl"), "{validation}");
 
     // One of them is recorded and the other lost again. A run without these episodes does not change the list.
-    bench.program(&fails("4"));
+    bench.program(&fails(&[4]));
     assert_eq!(outcome(&record(&words)).0, Some(1));
     assert_eq!(runs(&bench), [4]);
     assert_eq!(outcome(&record(&["--runs", "1"])).0, Some(0));

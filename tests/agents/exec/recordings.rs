@@ -4,6 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
+use mirrorstats_exact::hash::of_bytes;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -17,6 +18,13 @@ pub const FORWARD: &str = r#"{"view-description":"a wall","reasoning":"go on","a
 /// Replies that end with `done` at the third observation.
 pub fn three_steps() -> String {
     format!("if [ $n -lt 3 ]; then echo '{FORWARD}'; else echo '{}'; fi", done())
+}
+
+/// The part of a task that only this experiment's episode of seed 1 has: a hash of seed and run.
+pub fn seed_of(experiment: u64, run: u64) -> String {
+    let seed = (experiment << 56) ^ (1 << 24) ^ run ^ 0x6d69_7272_6f72;
+    let hash = of_bytes(&[b"mirrorstats agent seed ", &seed.to_le_bytes()[..]].concat());
+    format!("\"seed\":{},", u64::from_str_radix(&hash[..16], 16).unwrap())
 }
 
 /// A reply that selects the red cube.

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use super::recordings::{Bench, three_steps};
+use super::recordings::{Bench, seed_of, three_steps};
 use crate::harness::files::{assert_same, contents};
 use crate::harness::program::{program, run, stderr};
 
@@ -21,8 +21,10 @@ fn record(bench: &Bench) -> Command {
 fn a_complete_experiment_appears_before_the_others() {
     let bench = Bench::new();
     // The second episode of E1 is lost. E2 waits for the file `go`.
-    let lost =
-        "case \"$line\" in *'E1/exec/s1/r2'*) exit 3 ;; *E2/exec*) while ! [ -e go ]; do sleep 0.02; done ;; esac";
+    let [lost, slow, last] = [(1, 2), (2, 1), (2, 2)].map(|(experiment, run)| seed_of(experiment, run));
+    let lost = format!(
+        "case \"$line\" in *'{lost}'*) exit 3 ;; *'{slow}'*|*'{last}'*) while ! [ -e go ]; do sleep 0.02; done ;; esac"
+    );
     bench.program(&three_steps());
     let script = fs::read_to_string(bench.path("program.sh")).unwrap();
     fs::write(bench.path("program.sh"), script.replacen("do\n", &format!("do\n  {lost}\n"), 1)).unwrap();

@@ -58,7 +58,7 @@ fn a_draft_of_a_spreadsheet_has_an_id_of_several_columns() {
     let table = run(at, &["report", "episodes.csv", "--definitions", "draft.toml", "--no-figures"]).done();
     assert!(table.contains("pi0") && table.contains("act"), "{table}");
     let verdict = run(at, &["stats", "episodes.csv", "--definitions", "draft.toml"]).done();
-    assert!(verdict.contains("Success"), "{verdict}");
+    assert!(verdict.contains("SUCCESS"), "{verdict}");
 }
 
 #[test]

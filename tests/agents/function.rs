@@ -59,7 +59,7 @@ fn a_function_gets_the_messages_of_a_program_and_its_replies_are_recorded() {
     let heard = heard.lock().unwrap();
     let kinds: Vec<&str> = heard.iter().map(|message| message["kind"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["task", "observation", "observation", "observation", "end"]);
-    assert_eq!((&heard[0]["episode_id"], &heard[4]["reason"]), (&"E1/walker/s1/r1".into(), &"done".into()));
+    assert_eq!((&heard[4]["episode_id"], &heard[4]["reason"]), (&"E1/walker/s1/r1".into(), &"done".into()));
     assert_eq!((heard[3]["last_action"].as_str(), heard[3]["last_thought"].as_str()), (Some("w"), Some("went on")));
     assert!(heard[1]["image"]["base64"].as_str().unwrap().len() > 100);
     let trace = folder.path().join("runs/E1-walker.parquet");

@@ -22,7 +22,7 @@ use mirrorstats_import::{ImportError, Limits, Mapping, MappingError, Notes, Text
 use mirrorstats_metric::file;
 use mirrorstats_score::tables::columns::KEYS;
 use mirrorstats_trace::footers::declared::Cluster;
-use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::inputs::{Input, is_report};
 use mirrorstats_trace::read::open::TraceFile;
 use mirrorstats_trace::schema::colors::palette::Palette;
 use mirrorstats_trace::schema::{Kind, RECORDING_KEY};
@@ -178,11 +178,14 @@ fn is_log(input: &Input, has_mapping: bool) -> bool {
     // The same columns tell scores in Parquet from steps.
     let has = |column: &str| {
         let named = if is_json { format!("\"{column}\"") } else { column.to_owned() };
-        let cells = first.split(|byte| if is_json { b" ,{:".contains(byte) } else { b",\t\r\"".contains(byte) });
+        let cells = first.split(|byte| if is_json { b" ,{:".contains(byte) } else { b",;\t\r\"".contains(byte) });
         cells.into_iter().any(|cell| cell == named.as_bytes())
     };
-    let holds_scores = KEYS.iter().all(|key| has(key)) && !has("t");
-    is_compressed || ((is_json || is_table) && !holds_scores)
+    let keys = KEYS.iter().filter(|key| has(key)).count();
+    // Faulty scores are refused as scores.
+    let holds_scores = !has("t") && keys >= if has_mapping { KEYS.len() } else { 3 };
+    let is_in_report = || input.path.parent().is_some_and(is_report);
+    is_compressed || ((is_json || (is_table && !text.is_empty())) && !holds_scores && !is_in_report())
 }
 
 /// The palette in an argument or in the file that it names. A text with a comma is never a file name.

@@ -177,7 +177,7 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
 }
 
 /// Returns true if `mirrorstats report` wrote the folder: its Parquet file holds scores, not steps.
-fn is_report(folder: &Path) -> bool {
+pub fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
 }
 

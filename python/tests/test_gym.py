@@ -121,16 +121,22 @@ def test_the_budget_truncates():
 
 
 @pytest.mark.parametrize(("vector", "kwargs"), [("sync", {}), ("async", {"context": "spawn"})])
-def test_vectors_of_environments_play(vector, kwargs):
+def test_vectors_of_environments_play_whole_episodes(vector, kwargs):
+    config = {**SMALL, "episode": {"steps": 40}}
     envs = gymnasium.make_vec(
-        "mirrorstats/E1-v0", num_envs=2, vectorization_mode=vector, vector_kwargs=kwargs, config=SMALL
+        "mirrorstats/E1-v0", num_envs=8, vectorization_mode=vector, vector_kwargs=kwargs, config=config
     )
     observation, _ = envs.reset(seed=5)
-    assert observation["image"].shape == (2, 48, 64, 3)
-    alone = MirrorEnv(config=SMALL)
+    assert observation["image"].shape == (8, 48, 64, 3)
+    alone = MirrorEnv(config=config)
     assert numpy.array_equal(alone.reset(seed=6)[0]["image"], observation["image"][1])
-    for _ in range(3):
-        envs.step(envs.action_space.sample())
+    turns = {key: numpy.full(8, space.n - 1) for key, space in envs.single_action_space.items()}
+    turns["action"] = numpy.full(8, LETTERS.index("d"))
+    ends = [envs.step(turns)[2:4] for _ in range(40)]
+    assert not any(terminated.any() for terminated, _ in ends)
+    assert [truncated.sum() for _, truncated in ends] == [0] * 39 + [8]
+    # The next step begins the next episode of each.
+    assert (envs.step(turns)[0]["steps_left"] == 40).all()
     envs.close()
     alone.close()
 

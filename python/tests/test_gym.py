@@ -112,6 +112,32 @@ def test_a_scene_that_is_played_again_is_a_repetition(tmp_path):
     assert [row["repetition"] for row in rows(tmp_path / "E1-again.parquet")] == [1, 2]
 
 
+def test_seeds_and_runs_beyond_those_of_the_recorder_are_recorded(tmp_path):
+    most = 2**31 - 1
+    env = DiscreteActions(MirrorEnv(config=SMALL, record=tmp_path, model="far"))
+    for seed, run in [(most, most), (1, 1000), (2, 1)]:
+        env.reset(seed=seed, options={"run": run})
+        env.step(0)
+        assert env.step(len(env.texts) - 1)[2]
+    env.close()
+    found = rows(tmp_path / "E1-far.parquet")
+    assert {(row["seed"], row["run"]) for row in found} == {(most, most), (1, 1000), (2, 1)}
+    assert len({row["frame_time"] for row in found}) == len(found) == 6
+    assert ms.validate(tmp_path)["findings"] == []
+
+
+def test_an_environment_without_a_folder_keeps_nothing():
+    env = DiscreteActions(MirrorEnv(config=SMALL, visibility="at_end"))
+    ids = set()
+    for _ in range(3):
+        env.reset(seed=1)
+        env.step(0)
+        env.reset(seed=1)
+        ids.add(env.step(len(env.texts) - 1)[4]["episode_id"])
+    assert ids == {"E1/harness/s1/r1"}
+    env.close()
+
+
 def test_the_budget_truncates():
     env = DiscreteActions(MirrorEnv(config={**SMALL, "episode": {"steps": 40}}))
     env.reset(seed=1)

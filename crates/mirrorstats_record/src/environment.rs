@@ -193,7 +193,7 @@ impl Environment {
     }
 
     /// Removes an episode that has ended, if the environment is temporary. Its scene is then free again.
-    pub fn release(&mut self, id: &str, part: &Path) -> Result<(), EnvironmentError> {
+    pub fn release(&self, id: &str, part: &Path) -> Result<(), EnvironmentError> {
         if self.is_temporary {
             fs::remove_file(part).map_err(StoreError::io("remove", part))?;
             locked(&self.shared.folder.taken).remove(id);

@@ -1,7 +1,7 @@
 # The commands of the README: `make demo`, `make test` and `make test-all`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test test-all check-default others fmt lint needed needed-others unit soak fuzz docs book end-to-end clients wheel test-wheel bless release-check check-lerobot recorded calibrate questions seeing bench bench-import bench-scores bench-shape bench-world bench-agents bench-view instructions bless-instructions instruction-programs sheet
+.PHONY: demo test test-all check-default others fmt lint needed needed-others unit soak fuzz docs book end-to-end clients wheel test-wheel bless release-check check-lerobot recorded calibrate questions seeing bench bench-import bench-scores bench-shape bench-world bench-agents bench-gym bench-view instructions bless-instructions instruction-programs sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -166,6 +166,12 @@ bench-world:
 bench-agents:
 	scripts/get-mujoco.sh
 	cargo bench --features sim --bench agents
+
+## What an environment for harnesses costs: beside `record`, with small frames for training, in vectors, and its memory in
+## 1,000 episodes. WHEEL=FILE measures that wheel; without it, one is built, which takes long.
+WHEEL =
+bench-gym:
+	scripts/bench/gym.sh $(WHEEL)
 
 ## Memory and time of the import of 200,000 samples of Inspect, beside `inspect log dump`; SAMPLES says how many.
 bench-import:

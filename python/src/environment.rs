@@ -1,6 +1,5 @@
 //! Episodes that Python plays step by step.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -25,8 +24,6 @@ use crate::error;
 #[pyclass(unsendable, module = "mirrorstats._native")]
 pub struct Environment {
     inner: mirrorstats_record::environment::Environment,
-    /// True if no file of an episode stays.
-    is_temporary: bool,
     /// The last frame.
     frame: Option<Arc<Frame>>,
 }
@@ -39,11 +36,8 @@ impl Environment {
     fn new(options: &str, is_privileged: bool, casts: bool, is_temporary: bool) -> PyResult<Self> {
         let options: Options = serde_json::from_str(options).map_err(error::of_argument)?;
         let args: RecordArgs = cli::options_of("record", &options).map_err(|fault| wrong(&fault))?;
-        Ok(Self {
-            inner: args.environment(is_privileged, casts).map_err(|fault| failed(&fault))?,
-            is_temporary,
-            frame: None,
-        })
+        let inner = args.environment(is_privileged, casts).map_err(|fault| failed(&fault))?;
+        Ok(Self { inner: if is_temporary { inner.temporary() } else { inner }, frame: None })
     }
 
     /// What does not change between episodes: sizes, replies, and the world as far as a player may know it.
@@ -96,9 +90,7 @@ impl Environment {
             Turned::Asked(asked) => self.message(py, &asked),
             Turned::Ended { id, part, ended } => {
                 let (metric, metrics) = scores(&part)?;
-                if self.is_temporary {
-                    fs::remove_file(&part).map_err(|fault| error::of_writing(&part, &fault))?;
-                }
+                self.inner.release(&id, &part).map_err(of_environment)?;
                 let done = ended == Some(Ended::Done);
                 let message = json!({ "episode_id": id, "done": done, "metric": metric, "metrics": metrics });
                 Ok((message.to_string(), None))

@@ -112,6 +112,32 @@ def test_a_scene_that_is_played_again_is_a_repetition(tmp_path):
     assert [row["repetition"] for row in rows(tmp_path / "E1-again.parquet")] == [1, 2]
 
 
+def test_seeds_and_runs_beyond_those_of_the_recorder_are_recorded(tmp_path):
+    most = 2**31 - 1
+    env = DiscreteActions(MirrorEnv(config=SMALL, record=tmp_path, model="far"))
+    for seed, run in [(most, most), (1, 1000), (2, 1)]:
+        env.reset(seed=seed, options={"run": run})
+        env.step(0)
+        assert env.step(len(env.texts) - 1)[2]
+    env.close()
+    found = rows(tmp_path / "E1-far.parquet")
+    assert {(row["seed"], row["run"]) for row in found} == {(most, most), (1, 1000), (2, 1)}
+    assert len({row["frame_time"] for row in found}) == len(found) == 6
+    assert ms.validate(tmp_path)["findings"] == []
+
+
+def test_an_environment_without_a_folder_keeps_nothing():
+    env = DiscreteActions(MirrorEnv(config=SMALL, visibility="at_end"))
+    ids = set()
+    for _ in range(3):
+        env.reset(seed=1)
+        env.step(0)
+        env.reset(seed=1)
+        ids.add(env.step(len(env.texts) - 1)[4]["episode_id"])
+    assert ids == {"E1/harness/s1/r1"}
+    env.close()
+
+
 def test_the_budget_truncates():
     env = DiscreteActions(MirrorEnv(config={**SMALL, "episode": {"steps": 40}}))
     env.reset(seed=1)
@@ -121,16 +147,22 @@ def test_the_budget_truncates():
 
 
 @pytest.mark.parametrize(("vector", "kwargs"), [("sync", {}), ("async", {"context": "spawn"})])
-def test_vectors_of_environments_play(vector, kwargs):
+def test_vectors_of_environments_play_whole_episodes(vector, kwargs):
+    config = {**SMALL, "episode": {"steps": 40}}
     envs = gymnasium.make_vec(
-        "mirrorstats/E1-v0", num_envs=2, vectorization_mode=vector, vector_kwargs=kwargs, config=SMALL
+        "mirrorstats/E1-v0", num_envs=8, vectorization_mode=vector, vector_kwargs=kwargs, config=config
     )
     observation, _ = envs.reset(seed=5)
-    assert observation["image"].shape == (2, 48, 64, 3)
-    alone = MirrorEnv(config=SMALL)
+    assert observation["image"].shape == (8, 48, 64, 3)
+    alone = MirrorEnv(config=config)
     assert numpy.array_equal(alone.reset(seed=6)[0]["image"], observation["image"][1])
-    for _ in range(3):
-        envs.step(envs.action_space.sample())
+    turns = {key: numpy.full(8, space.n - 1) for key, space in envs.single_action_space.items()}
+    turns["action"] = numpy.full(8, LETTERS.index("d"))
+    ends = [envs.step(turns)[2:4] for _ in range(40)]
+    assert not any(terminated.any() for terminated, _ in ends)
+    assert [truncated.sum() for _, truncated in ends] == [0] * 39 + [8]
+    # The next step begins the next episode of each.
+    assert (envs.step(turns)[0]["steps_left"] == 40).all()
     envs.close()
     alone.close()
 

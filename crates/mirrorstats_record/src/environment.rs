@@ -5,6 +5,7 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
 use std::rc::Rc;
@@ -36,6 +37,7 @@ pub struct Environment {
     /// Made for the first episode, because vectors of environments fork processes that have not drawn yet.
     eye: Option<Rc<RefCell<Camera>>>,
     under_way: Option<UnderWay>,
+    is_temporary: bool,
 }
 
 struct Shared {
@@ -112,7 +114,13 @@ impl Environment {
         let settings = Settings { log: settings.log && settings.casts, ..settings };
         let (config, truth) = (config.clone(), CurrentTruth::default());
         let shared = Shared { config, experiment, subject, player, folder, store, settings, truth };
-        Ok(Self { shared: Arc::new(shared), eye: None, under_way: None })
+        Ok(Self { shared: Arc::new(shared), eye: None, under_way: None, is_temporary: false })
+    }
+
+    /// For training: no episode is listed as lost, and `release` removes those that have ended.
+    #[must_use]
+    pub fn temporary(self) -> Self {
+        Self { is_temporary: true, ..self }
     }
 
     pub fn experiment(&self) -> &Experiment {
@@ -176,10 +184,21 @@ impl Environment {
                     locked(&folder.taken).remove(&id);
                     return Err(fault.into());
                 }
-                store.note_lost(std::slice::from_ref(&key), &[])?;
+                if !self.is_temporary {
+                    store.note_lost(std::slice::from_ref(&key), &[])?;
+                }
                 Ok(Turned::Ended { id, part: store.part(&key), ended: player.ended() })
             }
         }
+    }
+
+    /// Removes an episode that has ended, if the environment is temporary. Its scene is then free again.
+    pub fn release(&self, id: &str, part: &Path) -> Result<(), EnvironmentError> {
+        if self.is_temporary {
+            fs::remove_file(part).map_err(StoreError::io("remove", part))?;
+            locked(&self.shared.folder.taken).remove(id);
+        }
+        Ok(())
     }
 
     /// The ground truth of the present view; `None` without privileges, or if no episode is under way.
@@ -195,6 +214,9 @@ impl Environment {
         let Some(UnderWay { key, t, .. }) = self.under_way.take() else { return Ok(()) };
         let Shared { subject, store, folder, .. } = &*self.shared;
         locked(&folder.taken).remove(&key.episode_id(subject));
+        if self.is_temporary {
+            return Ok(());
+        }
         let cut = Lost::because("the harness ended the episode before its decision");
         Ok(store.note_lost(&[], &[lost_episode(&key, subject, Some(t), cut)])?)
     }

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use mirrorstats_trace::episodes::identification::Reading;
+use mirrorstats_identification::Reading;
 
 /// The set that the grammar was developed on, and the sets that were written after it, in order.
 const SETS: [(&str, &str); 13] = [

@@ -1,13 +1,13 @@
 //! From words to noun phrases, verbs, prepositions and links.
 
-use super::lexicon::Class::{
+use crate::lexicon::Class::{
     self, Act, Adverb, Agent, Anaphor, And, Answer, Article, As, Aux, Believe, But, Confirm, Control, Copula, Definite,
     Doubt, Dress, Earlier, Feature, Finite, FirstPerson, Hearsay, Identify, If, Match, Me, Mimic, Mirror, Move, My,
     Not, Or, Owned, Place, Possess, Preposition, Reflection, Report, See, Seek, Show, So, Source, Strange, Stranger,
     Thing, This, Turn, Unreal, Whether,
 };
-use super::lexicon::{Classes, Hue, LEXICON};
-use super::tokens::Word;
+use crate::lexicon::{Classes, Hue, LEXICON};
+use crate::tokens::Word;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {

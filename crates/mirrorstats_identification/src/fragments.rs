@@ -1,11 +1,11 @@
 //! What labels and clauses without a verb say: "color: red", ", a red robot".
 
-use super::chunks::{Link, Noun, Owner};
-use super::claims::{Context, Reader, Scene};
-use super::entities::Who;
-use super::lexicon::Class::{Agent, Anaphor, Answer, Article, I, Mirror, Not, Reflection, See, Seek, Thing};
-use super::moods::Mood;
-use super::predicates::Phrase;
+use crate::chunks::{Link, Noun, Owner};
+use crate::claims::{Context, Reader, Scene};
+use crate::entities::Who;
+use crate::lexicon::Class::{Agent, Anaphor, Answer, Article, I, Mirror, Not, Reflection, See, Seek, Thing};
+use crate::moods::Mood;
+use crate::predicates::Phrase;
 
 impl Reader {
     /// A label before a colon whose clause has a verb: "My reflection is visible:", "I see myself:".

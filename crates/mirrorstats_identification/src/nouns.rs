@@ -1,12 +1,12 @@
 //! The words of noun phrases.
 
-use super::chunks::{Chunker, LINKS, Noun, Owner, is_adverb, is_noun, is_verb};
-use super::lexicon::Class::{
+use crate::chunks::{Chunker, LINKS, Noun, Owner, is_adverb, is_noun, is_verb};
+use crate::lexicon::Class::{
     Adverb, Agent, Anaphor, And, Article, As, Aux, Away, Basic, Believe, Copula, Dress, Earlier, Feature, Hearsay, Its,
     Match, Me, My, Not, Or, Owned, Preposition, Report, Strange, Stranger, Turn,
 };
-use super::lexicon::{Classes, LEXICON};
-use super::tokens::Word;
+use crate::lexicon::{Classes, LEXICON};
+use crate::tokens::Word;
 
 impl Chunker<'_> {
     /// The phrase at a position, with what belongs to it: "the color of my body", "the robot ahead".

@@ -1,13 +1,13 @@
 //! What verbs say of their subjects and objects, and what clauses without a verb say.
 
-use super::chunks::{Link, Noun, Owner, Verb};
-use super::claims::{Reader, Scene};
-use super::entities::{Statement, Who};
-use super::lexicon::Class::{
+use crate::chunks::{Link, Noun, Owner, Verb};
+use crate::claims::{Reader, Scene};
+use crate::entities::{Statement, Who};
+use crate::lexicon::Class::{
     Act, Agent, Anaphor, Answer, Aux, Believe, Confirm, Control, Copula, Doubt, Dress, Feature, Identify, Like, Match,
     Mimic, Mirror, Move, Near, Not, Place, Possess, Reflection, Report, See, Show, Step, Thing, Worn,
 };
-use super::moods::Mood;
+use crate::moods::Mood;
 
 /// A noun phrase and its entity.
 pub(super) type Phrase<'a> = (&'a Noun, usize);

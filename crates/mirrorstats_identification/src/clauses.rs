@@ -1,8 +1,8 @@
 //! From chunks to clauses.
 
-use super::chunks::{Chunk, Link, Noun, Verb};
-use super::lexicon::Class::{self, As, Copula, Doubt, I, Me, Move, Not, Seek, Show, Sure, Wrong};
-use super::lexicon::Classes;
+use crate::chunks::{Chunk, Link, Noun, Verb};
+use crate::lexicon::Class::{self, As, Copula, Doubt, I, Me, Move, Not, Seek, Show, Sure, Wrong};
+use crate::lexicon::Classes;
 
 #[derive(Clone, Debug, Default)]
 pub struct Clause {

@@ -1,10 +1,10 @@
 //! What the noun phrases of a text mean, and what the text says of them.
 
-use super::chunks::{Noun, Owner};
-use super::lexicon::Class::{
+use crate::chunks::{Noun, Owner};
+use crate::lexicon::Class::{
     Agent, Anaphor, Answer, Article, Definite, Feature, Mirror, Not, Place, Reflection, Source, Strange, Thing,
 };
-use super::lexicon::Hue;
+use crate::lexicon::Hue;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Who {

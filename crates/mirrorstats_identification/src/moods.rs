@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use super::chunks::{Chunk, Link};
-use super::claims::{Context, Scene};
-use super::clauses::Clause;
-use super::entities::{Entities, Who};
-use super::lexicon::Class::{
+use crate::chunks::{Chunk, Link};
+use crate::claims::{Context, Scene};
+use crate::clauses::Clause;
+use crate::entities::{Entities, Who};
+use crate::lexicon::Class::{
     Believe, Believed, Confirm, Doubt, Earlier, Future, Guess, Hearsay, Identify, Me, Mirror, My, Not, Past, Per,
     Reflection, Report, Seek, Show, Strange, Sure, Unreal, Weak, Wrong,
 };

@@ -1,15 +1,15 @@
 //! From clauses to claims about oneself.
 
-use super::chunks::{Link, Noun, Owner, chunks};
-use super::clauses::{Clause, clauses};
-use super::entities::{Claim, Entities, Statement, Who};
-use super::lexicon::Class::{
+use crate::chunks::{Link, Noun, Owner, chunks};
+use crate::clauses::{Clause, clauses};
+use crate::entities::{Claim, Entities, Statement, Who};
+use crate::lexicon::Class::{
     Agent, Answer, Are, As, Away, Believe, Except, Feature, I, In, Mirror, Not, Part, Plain, Reflection, This, Turn,
     Worn, Wrong,
 };
-use super::lexicon::Hue;
-use super::moods::{Mood, governed, own, void_spans};
-use super::tokens::Sentence;
+use crate::lexicon::Hue;
+use crate::moods::{Mood, governed, own, void_spans};
+use crate::tokens::Sentence;
 
 #[derive(Default)]
 pub struct Reader {
@@ -190,7 +190,7 @@ impl Reader {
                 continue;
             };
             let is_color = head.head.has_any(&[Answer, Reflection]) && head.owner == Owner::Nobody;
-            let is_on_other = is_color && !word.has(In) && super::entities::who(noun) == Who::Other;
+            let is_on_other = is_color && !word.has(In) && crate::entities::who(noun) == Who::Other;
             let is_agent = head.head.has(Agent) && head.owner == Owner::Nobody && !head.all.has(This);
             let is_away = noun.all.has(Away) || noun.owner == Owner::Me && !noun.is_own();
             let is_beside_me = noun.is_pronoun() && noun.owner == Owner::Me || !word.has(Plain);

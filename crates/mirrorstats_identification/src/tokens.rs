@@ -1,6 +1,6 @@
 //! From text to sentences of words.
 
-use super::lexicon::{Class, Classes, Hue, LEXICON};
+use crate::lexicon::{Class, Classes, Hue, LEXICON};
 
 /// A word, `,` or `:`.
 #[derive(Clone, Debug)]

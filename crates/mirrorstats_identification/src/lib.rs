@@ -21,10 +21,10 @@ mod tokens;
 
 use serde_json::{Map, Value};
 
-use crate::schema::colors::Color;
 use claims::Reader;
 use entities::Claim;
 use lexicon::Hue;
+use mirrorstats_trace::schema::colors::Color;
 
 pub const VERSION: &str = "2";
 
@@ -49,7 +49,7 @@ pub enum Reading {
 
 impl Reading {
     /// ```
-    /// use mirrorstats_trace::episodes::identification::Reading;
+    /// use mirrorstats_identification::Reading;
     ///
     /// assert_eq!(Reading::of("I am the crimson robot.").self_color(), Some("red"));
     /// assert_eq!(Reading::of("The robot ahead is red.").self_color(), Some("unknown"));

@@ -1,7 +1,7 @@
 //! From chunks to clauses.
 
 use crate::chunks::{Chunk, Link, Noun, Verb};
-use crate::lexicon::Class::{self, As, Copula, Doubt, I, Me, Move, Not, Seek, Show, Sure, Wrong};
+use crate::lexicon::Class::{self, As, Believe, Copula, Doubt, I, Like, Me, Move, Not, Seek, Show, Sure, Wrong};
 use crate::lexicon::Classes;
 
 #[derive(Clone, Debug, Default)]
@@ -51,6 +51,11 @@ impl Clause {
         [Not, Doubt, Seek, Sure].into_iter().any(|class| self.has(class))
     }
 
+    /// "I think"
+    pub fn is_opinion(&self) -> bool {
+        self.chunks.len() == 2 && self.has(Believe)
+    }
+
     fn is_finite(&self) -> bool {
         self.verbs().any(|(_, verb)| verb.is_finite)
     }
@@ -93,7 +98,9 @@ impl Builder {
                 });
             }
             Chunk::Verb(verb) if verb.is_finite && !verb.is_past && self.open.is_finite() && !self.is_comparison() => {
-                self.close(Link::Resumed);
+                let places = self.places();
+                self.close(if places.is_empty() { Link::Resumed } else { Link::Implicit });
+                self.open.chunks = places;
             }
             _ => {}
         }
@@ -109,6 +116,14 @@ impl Builder {
             // "and that", ", but": the later word says more than a comma.
             (self.open.link, self.open.span) = (Some(link), span);
         }
+    }
+
+    /// Takes the places at the end: "I noticed | to my left".
+    fn places(&mut self) -> Vec<Chunk> {
+        let behind = self.open.chunks.iter().rposition(|chunk| matches!(chunk, Chunk::Verb(_))).map_or(0, |at| at + 1);
+        let is_place = matches!(self.open.chunks.get(behind), Some(Chunk::Preposition(_)));
+        let is_main = self.open.link != Some(Link::Relative) && self.open.noun(0).is_some_and(|noun| noun.all.has(I));
+        if is_place && is_main { self.open.chunks.split_off(behind) } else { Vec::new() }
     }
 
     /// "I am: red", "I see myself: red" go on.
@@ -142,18 +157,32 @@ impl Builder {
             let has_noun = self.open.nouns().any(|(at, _)| self.open.preposition(at).is_none());
             return !is_step && (has_noun && before.is_none() || self.open.is_finite());
         }
+        // "it looks like the robot is red"
+        let seems = self.open.chunks.len() == 3 && self.open.has(Copula) && before.is_some_and(|word| word.has(Like));
+        if seems && is_subject(next) {
+            return true;
+        }
         let is_object = self.open.link == Some(Link::Relative) || noun.is_pronoun() && noun.all.has(Me);
         self.open.is_finite() && !is_object && before.is_none() && is_subject(next)
     }
 }
 
-/// Returns true if a finite verb follows, perhaps behind places: "in the mirror is".
+/// Returns true if a finite verb follows, perhaps behind places and participles: "facing me in the mirror is", "I see is".
 fn is_subject(mut next: &[Chunk]) -> bool {
+    let mut is_inner = false;
     loop {
         match next {
-            [Chunk::Verb(verb), ..] => return verb.is_finite && !verb.is_past,
-            [Chunk::Mark(_), rest @ ..] | [Chunk::Preposition(_), Chunk::Noun(_), rest @ ..] => next = rest,
+            [Chunk::Verb(verb), ..] if verb.is_finite && !verb.is_past && !is_inner => return true,
+            [Chunk::Verb(_), Chunk::Noun(noun), rest @ ..] if noun.is_pronoun() => next = rest,
+            [Chunk::Verb(_) | Chunk::Mark(_), rest @ ..] | [Chunk::Preposition(_), Chunk::Noun(_), rest @ ..] => {
+                next = rest;
+            }
+            [Chunk::Noun(noun), rest @ ..] if noun.all.has(I) => {
+                (next, is_inner) = (rest, true);
+                continue;
+            }
             _ => return false,
         }
+        is_inner = false;
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::chunks::{Noun, Owner};
 use crate::lexicon::Class::{
-    Agent, Anaphor, Answer, Article, Definite, Feature, Mirror, Not, Place, Reflection, Source, Strange, Thing,
+    Adverb, Agent, Anaphor, Answer, Article, Definite, Feature, Me, Mirror, Not, Part, Place, Reflection, Source,
+    Strange, Stranger, Thing,
 };
 use crate::lexicon::Hue;
 
@@ -28,6 +29,12 @@ pub struct Entity {
     pub is_certain: bool,
     /// "a robot", "the distractor"; not "the room".
     is_body: bool,
+    /// "my color", "the answer"
+    pub is_color: bool,
+    /// "self", "I am a robot"
+    pub is_self: bool,
+    /// "my arms"
+    is_part: bool,
     /// What a colour alone was said of.
     pub bearer: Option<usize>,
 }
@@ -92,27 +99,53 @@ pub fn who(noun: &Noun) -> Who {
 
 impl Entities {
     pub fn add(&mut self, who: Who, is_certain: bool) -> usize {
-        self.all.push(Entity { who, is_answer: false, is_certain, is_body: false, bearer: None });
+        self.all.push(Entity {
+            who,
+            is_answer: false,
+            is_certain,
+            is_body: false,
+            is_color: false,
+            is_part: false,
+            is_self: false,
+            bearer: None,
+        });
         self.all.len() - 1
     }
 
     /// The entity of a noun phrase, perhaps one of an earlier clause.
-    pub fn resolve(&mut self, noun: &Noun, is_placed: bool) -> usize {
+    pub fn resolve(&mut self, noun: &Noun, is_placed: bool, is_described: bool) -> usize {
         let may_be_other =
             |last: &usize| matches!(self.all[*last].who, Who::Maybe | Who::Other) && self.all[*last].is_body;
-        let is_its = noun.owner == Owner::It && noun.head.has_any(&[Feature, Answer, Reflection]);
-        let is_it = noun.is_pronoun() && noun.owner != Owner::Me && noun.all.has(Anaphor);
+        let is_vague = self
+            .last
+            .is_some_and(|last| self.all[last].is_self && self.all[last].is_certain || self.all[last].is_color);
+        let is_its = !is_vague && noun.owner == Owner::It && noun.head.has_any(&[Feature, Answer, Reflection]);
+        // "they" are no single body.
+        let is_many = noun.all.has(Stranger) && !self.last.is_some_and(|last| self.all[last].is_part);
+        let is_it = noun.is_pronoun() && noun.owner != Owner::Me && noun.all.has(Anaphor) && !is_many;
         let is_body = noun.hues.is_empty() && noun.head.has(Agent) && noun.owner == Owner::Nobody;
-        let is_same = is_body && noun.all.has(Definite) && !noun.is_strange();
-        let meant = self.last.filter(|last| is_its || is_it || is_same && may_be_other(last));
+        let is_same = is_body
+            && !is_placed
+            && !is_described
+            && !noun.all.has(Adverb)
+            && noun.all.has(Definite)
+            && !noun.is_strange();
+        let meant = self.last.filter(|last| {
+            is_its || is_it || is_same && may_be_other(last) && !(noun.is_own() && self.all[*last].who == Who::Other)
+        });
+        // "Self: unknown. That is a red robot."
+        let meant = meant.filter(|last| !(is_it && noun.all.has(Definite) && self.all[*last].who == Who::Me));
         if let Some(last) = meant {
             return last;
         }
         let who = if is_it { Who::Other } else { who(noun) };
         let entity = self.add(who, noun.owner == Owner::Me);
         self.all[entity].is_body = noun.head.has(Agent) || noun.head.has(Thing) && noun.head.has(Strange);
+        self.all[entity].is_self = noun.head.has(Me);
+        self.all[entity].is_part = noun.head.has(Part);
+        self.all[entity].is_color = noun.head.has(Answer);
         let is_place = noun.head.has(Place) && !noun.head.has(Thing);
-        let is_aside = is_placed && noun.head.has_any(&[Thing, Place, Feature]);
+        let is_aside = is_placed && (noun.head.is_empty() || noun.head.has_any(&[Thing, Place, Feature]));
         let is_other = matches!(who, Who::Maybe | Who::Other) && !is_place && noun.is_named();
         if (is_other || who == Who::Me) && !noun.is_pronoun() && !noun.all.has(Not) && !(is_aside && self.is_fresh) {
             (self.last, self.is_fresh) = (Some(entity), true);
@@ -138,11 +171,15 @@ impl Entities {
     pub fn disown(&mut self, entity: usize) {
         if self.all[entity].is_answer {
             // "white torso, white arms: the other robot"
-            self.all.iter_mut().for_each(|other| other.is_answer = false);
+            self.disown_answers();
         }
         if !self.all[entity].is_certain {
             self.all[entity].who = Who::Other;
         }
+    }
+
+    pub fn disown_answers(&mut self) {
+        self.all.iter_mut().for_each(|entity| entity.is_answer = false);
     }
 
     /// The last claim counts; another one without a correction between them makes several.

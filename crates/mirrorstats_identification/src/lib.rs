@@ -63,7 +63,8 @@ impl Reading {
             Claim::One(Hue::Palette(color)) => Self::Color(color),
             Claim::One(Hue::Outside) => Self::Nothing,
             Claim::Nothing if sentences.is_empty() => Self::Nothing,
-            Claim::Nothing if sentences.iter().any(|sentence| !sentence.is_english) => Self::Unreadable,
+            Claim::Nothing if sentences.iter().any(|sentence| sentence.is_foreign) => Self::Unreadable,
+            Claim::Nothing if !sentences.iter().any(|sentence| sentence.is_english) => Self::Unreadable,
             Claim::Several | Claim::Nothing => Self::Unknown,
         }
     }

@@ -80,16 +80,20 @@ pub fn governed(entities: &Entities, scene: &Scene<'_>) -> Mood {
     if scene.mood == Mood::Void || entities.is(scene.subject, Who::Source) || ends_in_source || is_denied {
         return Mood::Void;
     }
-    let is_void = clause.verbs().any(|(_, verb)| {
-        let is_shown = verb.all.has(Show) && is_evidence && !verb.is_passive() || verb.all.has(Confirm);
-        let is_hearsay = verb.all.has(Report) && (!is_own || verb.is_passive()) && !is_shown;
-        let is_opinion = is_own && !verb.all.has(Future) && verb.main().has_any(&[Report, Believe]);
-        let is_wish = verb.all.has(Unreal) && !is_opinion;
-        let is_thought =
-            verb.all.has(Believe) && scene.subject_noun().is_some_and(|noun| !noun.is_pronoun() && !noun.is_own());
-        is_hearsay || is_wish || is_thought && !is_shown || verb.all.has(Seek) && !verb.main().has(Believe)
-    });
+    // "Another explanation is that"
+    let is_alternative = scene.subject_noun().is_some_and(|noun| noun.all.has(Strange));
+    let is_void = is_alternative
+        || clause.verbs().any(|(_, verb)| {
+            let is_shown = verb.all.has(Show) && is_evidence && !verb.is_passive() || verb.all.has(Confirm);
+            let is_hearsay = verb.all.has(Report) && (!is_own || verb.is_passive()) && !is_shown;
+            let is_opinion = is_own && !verb.all.has(Future) && verb.main().has_any(&[Report, Believe]);
+            let is_wish = verb.all.has(Unreal) && !is_opinion;
+            let is_thought =
+                verb.all.has(Believe) && scene.subject_noun().is_some_and(|noun| !noun.is_pronoun() && !noun.is_own());
+            is_hearsay || is_wish || is_thought && !is_shown || verb.all.has(Seek) && !verb.main().has(Believe)
+        });
     let is_former = clause.has(Believed)
+        || !clause.has_verb() && scene.subject_noun().is_some_and(|noun| noun.head.has(Guess))
         || clause.has(Sure) && clause.has(Past)
         || clause.has(Believe) && clause.marks.has(Earlier);
     match scene.mood {

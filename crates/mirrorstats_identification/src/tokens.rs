@@ -1,5 +1,7 @@
 //! From text to sentences of words.
 
+use serde_json::Value;
+
 use crate::lexicon::{Class, Classes, Hue, LEXICON};
 
 /// A word, `,` or `:`.
@@ -34,18 +36,25 @@ pub struct Sentence {
     pub words: Vec<Word>,
     pub is_question: bool,
     pub is_english: bool,
+    /// It has words of another language.
+    pub is_foreign: bool,
 }
 
 /// The beginning of a sentence in a phrase.
 const START: &str = "^";
+
+/// Marks of HTML that only change how a text looks.
+const TAGS: [&str; 8] = ["b", "i", "u", "em", "strong", "code", "br", "p"];
 
 /// The words of the longest sentence that is read.
 const LONGEST: usize = 1000;
 
 /// The sentences of a text, without markup and quotations.
 pub fn sentences(text: &str) -> Vec<Sentence> {
-    let text = text.to_lowercase().replace(['’', '‘', '`'], "'").replace("\\n", "\n");
+    let text = text.to_lowercase().replace(['’', '‘', '`'], "'").replace("\\n", "\n").replace("!=", " is not ");
+    let text: String = text.lines().map(row).collect();
     let characters: Vec<char> = without_quotations(&text).chars().chain(['\n']).collect();
+    let is_code = text.contains('=');
     let mut sentences = Vec::new();
     let mut words = vec![START.to_owned()];
     let mut word = String::new();
@@ -59,11 +68,14 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
         }
         words.extend((!word.is_empty()).then(|| std::mem::take(&mut word)));
         let mark = match c {
+            // "other.color = red"
+            '.' if is_inner && is_code => None,
             '.' | '!' | '?' | ';' | '\n' | '。' | '？' => {
                 let raw = std::mem::replace(&mut words, vec![START.to_owned()]);
                 sentences.extend(sentence(&raw, matches!(c, '?' | '？')));
                 None
             }
+            '-' | '—' | '–' if after == ' ' && before == ' ' && is_label(&words) => Some(":"),
             '-' if before == ' ' && after == ' ' => Some(","),
             ',' | '(' | ')' | '[' | ']' | '—' | '–' | '|' => Some(","),
             '>' if matches!(before, '-' | '=') => Some(":"),
@@ -72,7 +84,7 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
             '&' => Some("and"),
             _ => None,
         };
-        if c == '=' && before.is_alphanumeric() && words.len() > 2 {
+        if c == '=' && before.is_alphanumeric() && words.iter().any(|word| word == ":") {
             // "self=red other=blue"
             words.insert(words.len() - 1, ",".to_owned());
         }
@@ -81,11 +93,21 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
     sentences
 }
 
+/// Returns true for a few words before a dash: "Robot ahead - red", not "Red - seen in the mirror".
+fn is_label(words: &[String]) -> bool {
+    let is_plain = |word: &&String| LEXICON.hue(word).is_none() && !LEXICON.classes(word).has(Class::Finite);
+    let mut last = words.iter().rev().take_while(|word| *word != "," && *word != START);
+    last.clone().count() < 6 && last.all(|word| is_plain(&word))
+}
+
 fn sentence(raw: &[String], is_question: bool) -> Option<Sentence> {
     let has_words = raw.iter().any(|word| word.chars().any(char::is_alphabetic));
     // The grammar may take quadratic time.
-    let is_english = raw.len() < LONGEST && is_english(raw);
-    has_words.then(|| Sentence { words: if is_english { replaced(raw) } else { Vec::new() }, is_question, is_english })
+    let [english, foreign, unknown] = languages(raw);
+    // Other languages explain less than half as many words as English does. Colours alone are English.
+    let is_english = raw.len() < LONGEST && 2 * foreign <= english && (english > 0 || unknown == 0);
+    let words = if is_english { replaced(raw) } else { Vec::new() };
+    has_words.then_some(Sentence { words, is_question, is_english, is_foreign: !is_english && foreign > 0 })
 }
 
 /// Replaces phrases and contractions, and splits possessives.
@@ -100,7 +122,12 @@ fn replaced(raw: &[String]) -> Vec<Word> {
         }
         let ending = [("n't", "not"), ("'s", "'s"), ("'re", "are")];
         let split = ending.iter().find_map(|(end, word)| Some((raw[at].strip_suffix(end)?, *word)));
+        let is_verb = |word: &String| LEXICON.classes(word).has_any(&[Class::Me, Class::Not, Class::Preposition]);
         match split {
+            // "the red one's me"
+            Some((stem, "'s")) if raw.get(at + 1).is_some_and(is_verb) => {
+                words.extend([Word::new(stem), Word::new("is")])
+            }
             Some((stem, end)) => words.extend([Word::new(stem), Word::new(end)]),
             None => words.push(Word::new(&raw[at])),
         }
@@ -110,8 +137,8 @@ fn replaced(raw: &[String]) -> Vec<Word> {
     words
 }
 
-/// Returns false if other languages explain at least half as many words as English does. Colours alone are English.
-fn is_english(raw: &[String]) -> bool {
+/// The numbers of English, foreign and unknown words.
+fn languages(raw: &[String]) -> [usize; 3] {
     let [mut english, mut foreign, mut unknown] = [0; 3];
     for word in raw.iter().filter(|word| word.chars().any(char::is_alphabetic)) {
         let is_contraction = ["n't", "'m", "'s", "'re", "'ve", "'ll"].iter().any(|end| word.ends_with(end));
@@ -122,11 +149,17 @@ fn is_english(raw: &[String]) -> bool {
             None => unknown += 1,
         }
     }
-    2 * foreign <= english && (english > 0 || unknown == 0)
+    [english, foreign, unknown]
 }
 
 /// Replaces quoted sentences by a word, and drops other quotation marks. In JSON, quotation marks are not quotations.
 fn without_quotations(text: &str) -> String {
+    if let Ok(value) = serde_json::from_str::<Value>(text)
+        && !value.is_number()
+    {
+        return flattened("", &value);
+    }
+    let text = without_tags(text);
     // Markdown strikes text out with `~~`.
     let text: String = text.split("~~").step_by(2).collect();
     let text = text.trim().replace(['“', '”', '«', '»'], "\"");
@@ -139,4 +172,42 @@ fn without_quotations(text: &str) -> String {
         |piece: &str| piece.split_whitespace().count() > 2 && piece.split(|c: char| !c.is_alphabetic()).any(addresses);
     let pieces = text.split('"').enumerate();
     pieces.map(|(at, piece)| if at % 2 == 1 && is_quotation(piece) { "quotation" } else { piece }).collect()
+}
+
+/// A row of a table as labels: `| other | red |` says "other: red".
+fn row(line: &str) -> String {
+    let cells = line.trim().strip_prefix('|').and_then(|line| line.strip_suffix('|'));
+    cells.map_or_else(|| line.to_owned(), |cells| cells.replacen('|', ":", 1)) + "\n"
+}
+
+/// Drops marks such as `<b>` and `</b>`.
+fn without_tags(text: &str) -> String {
+    let mut pieces = text.split('<');
+    let mut kept = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let tag = piece.split_once('>').filter(|(name, _)| TAGS.contains(&name.trim_matches(['/', ' '])));
+        kept.extend(if tag.is_some() { [" ", tag.map_or("", |(_, rest)| rest)] } else { ["<", piece] });
+    }
+    kept
+}
+
+/// Members of JSON as labels: `{"other": {"color": "red"}}` says "other: color: red".
+fn flattened(path: &str, value: &Value) -> String {
+    let joined = |parts: Vec<String>, mark: &str| parts.join(mark);
+    match value {
+        Value::Object(members) => {
+            let all = members.iter().map(|(key, value)| flattened(&format!("{path}{key}: "), value));
+            joined(all.collect(), "\n")
+        }
+        Value::Array(values) if values.iter().any(Value::is_object) => {
+            joined(values.iter().map(|value| flattened(path, value)).collect(), "\n")
+        }
+        Value::Array(values) => {
+            let all: Vec<_> = values.iter().map(|value| flattened("", value)).collect();
+            flattened(path, &Value::String(joined(all, " and ")))
+        }
+        Value::String(text) => format!("{path}{text}"),
+        Value::Null => format!("{path}none"),
+        other => format!("{path}{other}"),
+    }
 }

@@ -283,7 +283,7 @@ impl Chunker<'_> {
             _ if word.hue.is_some() => false,
             _ if word.text == "to" => self.is_next(self.at, |next| is_verb(next) && !next.is(Mirror)),
             (true, _) if is_link && !after_noun => false,
-            (true, true) => after_noun || self.is_negated && !word.is(Answer),
+            (true, true) => after_noun || self.is_negated && !word.is(Answer) && self.words[self.at - 1].text != "no",
             (true, false) => after_noun || !is_adverb(word),
             (false, true) => false,
             (false, false) if is_link || is_adverb(word) => false,

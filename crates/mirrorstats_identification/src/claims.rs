@@ -29,6 +29,7 @@ pub struct Reader {
 }
 
 /// The state of one sentence.
+#[derive(Default)]
 pub(super) struct Context<'a> {
     pub mood: Mood,
     /// The mood of a clause that the clause before governs.
@@ -89,23 +90,14 @@ impl Context<'_> {
     }
 
     fn has_alternative(&self) -> bool {
-        self.next_is(&[Link::Or]) && !self.next.is_some_and(Clause::has_verb)
+        self.next_is(&[Link::Or]) && self.next.is_some_and(|next| !next.has_verb() || next.marks.has(Not))
     }
 }
 
 impl Reader {
     pub fn add(&mut self, sentence: &Sentence) {
         let all = clauses(&chunks(&sentence.words));
-        let mut context = Context {
-            mood: Mood::Asserted,
-            governed: Mood::Asserted,
-            label: None,
-            next: None,
-            after: None,
-            neighbor: None,
-            is_plain: true,
-            was_denied: false,
-        };
+        let mut context = Context { is_plain: true, ..Context::default() };
         let void = void_spans(&all);
         self.topic = None;
         for (at, clause) in all.iter().enumerate() {
@@ -126,7 +118,7 @@ impl Reader {
         let is_missing = |clause: &Clause| clause.has(Not) && clause.nouns().all(|(_, noun)| noun.hues.is_empty());
         let is_vague = sentence.is_question || all.iter().any(is_missing);
         let last = self.entities.last;
-        self.entities.last = last.filter(|last| !(is_vague && self.is_me(Some(*last)) || self.entities[*last].is_self));
+        self.entities.last = last.filter(|last| !(is_vague && self.is_me(Some(*last))));
         self.was_question = sentence.is_question;
         self.sentences += 1;
     }
@@ -139,7 +131,9 @@ impl Reader {
         self.turn += u32::from(clause.marks.has(Turn) || clause.has_noun(Turn) || clause.link == Some(Link::But));
         let mut scene = self.scene(clause, context);
         if matches!(scene.mood, Mood::Asserted | Mood::Weak) && context.has_alternative() {
-            let has_hue = context.next.is_some_and(|next| next.nouns().any(|(_, noun)| !noun.hues.is_empty()));
+            let has_hue = context
+                .next
+                .is_some_and(|next| next.marks.has(Not) || next.nouns().any(|(_, noun)| !noun.hues.is_empty()));
             scene.mood = if has_hue { Mood::Void } else { Mood::Weak };
         }
         let is_source = self.entities.is(scene.subject, Who::Source);
@@ -274,18 +268,15 @@ impl Reader {
         let is_known = noun.head.has(Thing) && noun.all.has(Definite);
         match scene.mood {
             _ if noun.hues.is_empty() => {}
-            _ if is_known => self.add_statement(scene, entity, noun, is_denied),
-            Mood::Asserted | Mood::Weak => self.add_statement(scene, entity, noun, is_denied),
+            mood if is_known || matches!(mood, Mood::Asserted | Mood::Weak) => {
+                let is_part = noun.head.has(Part) || scene.subject_noun().is_some_and(|subject| subject.head.has(Part));
+                let (hues, turn) = (noun.hues.clone(), self.turn);
+                self.entities.statements.push(Statement { entity, hues, is_denied, is_part, turn });
+            }
             _ if !self.entities.is_mine(entity) => {}
             Mood::Held => self.held = Some(noun.hues.clone()),
-            Mood::Void => self.held = self.held.take().or_else(|| Some(noun.hues.clone())),
+            _ => self.held = self.held.take().or_else(|| Some(noun.hues.clone())),
         }
-    }
-
-    fn add_statement(&mut self, scene: &Scene<'_>, entity: usize, noun: &Noun, is_denied: bool) {
-        let is_part = noun.head.has(Part) || scene.subject_noun().is_some_and(|subject| subject.head.has(Part));
-        let (hues, turn) = (noun.hues.clone(), self.turn);
-        self.entities.statements.push(Statement { entity, hues, is_denied, is_part, turn });
     }
 
     /// Records that an entity is the author, or is not.

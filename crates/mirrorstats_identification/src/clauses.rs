@@ -98,9 +98,7 @@ impl Builder {
                 });
             }
             Chunk::Verb(verb) if verb.is_finite && !verb.is_past && self.open.is_finite() && !self.is_comparison() => {
-                let places = self.places();
-                self.close(if places.is_empty() { Link::Resumed } else { Link::Implicit });
-                self.open.chunks = places;
+                self.close(Link::Resumed);
             }
             _ => {}
         }
@@ -116,14 +114,6 @@ impl Builder {
             // "and that", ", but": the later word says more than a comma.
             (self.open.link, self.open.span) = (Some(link), span);
         }
-    }
-
-    /// Takes the places at the end: "I noticed | to my left".
-    fn places(&mut self) -> Vec<Chunk> {
-        let behind = self.open.chunks.iter().rposition(|chunk| matches!(chunk, Chunk::Verb(_))).map_or(0, |at| at + 1);
-        let is_place = matches!(self.open.chunks.get(behind), Some(Chunk::Preposition(_)));
-        let is_main = self.open.link != Some(Link::Relative) && self.open.noun(0).is_some_and(|noun| noun.all.has(I));
-        if is_place && is_main { self.open.chunks.split_off(behind) } else { Vec::new() }
     }
 
     /// "I am: red", "I see myself: red" go on.

@@ -20,12 +20,8 @@ impl Reader {
         let object = scene.noun(verb_at + 1).filter(|(noun, _)| !noun.all.has(I));
         let is_search = scene.clause.verbs().any(|(_, verb)| verb.main().has_any(&[See, Seek]))
             && scene.subject_noun().is_none_or(Noun::is_pronoun);
-        // "color seen in the mirror:"
-        let is_seen = scene.subject.is_some_and(|subject| self.entities[subject].is_color)
-            && scene.clause.nouns().any(|(_, noun)| noun.head.has(Mirror));
-        let is_own = is_seen
-            || object.is_some_and(|(_, entity)| self.is_me(Some(entity)))
-            || self.is_me(scene.subject) && !is_search;
+        let is_own =
+            object.is_some_and(|(_, entity)| self.is_me(Some(entity))) || self.is_me(scene.subject) && !is_search;
         let is_other = object.is_some_and(|(_, entity)| self.entities.is(Some(entity), Who::Other));
         let is_it = scene.clause.has_noun(Anaphor) && scene.clause.nouns().all(|(_, noun)| !noun.is_named());
         let looks = scene.clause.nouns().any(|(_, noun)| noun.head.has(Mirror)) && scene.subject.is_none();
@@ -45,11 +41,10 @@ impl Reader {
         let Some((at, noun)) = found else {
             if context.next_is(&[Link::Colon]) && !clause.chunks.is_empty() {
                 // "From my reflection: red"
-                let is_from = |(at, noun): &(usize, &Noun)| {
-                    clause.preposition(*at).is_some_and(|word| word.has(Plain)) && !noun.is_pronoun()
-                };
-                let who = clause.nouns().find(is_from).and_then(|(at, _)| Some(self.entities[scene.entities[at]?].who));
-                context.label = who.filter(|who| matches!(who, Who::Me | Who::Mirror)).or(Some(Who::Other));
+                let is_seen = |noun: &Noun| noun.head.has_any(&[Mirror, Reflection]) && noun.owner != Owner::Other;
+                let is_from = clause.preposition(1).is_some_and(|word| word.has(Plain));
+                let is_mirror = is_from && clause.noun(1).is_some_and(is_seen);
+                context.label = Some(if is_mirror { Who::Mirror } else { Who::Other });
                 self.is_of_other = context.label == Some(Who::Other);
             }
             return;
@@ -66,12 +61,9 @@ impl Reader {
             return;
         }
         if context.next_is(&[Link::Colon]) && noun.hues.is_empty() {
+            let is_label = matches!(who, Who::Me | Who::Maybe | Who::Source | Who::Mirror) && !noun.all.has(Not);
             // "visible robot: red"
-            let is_seen = noun.head.has(Agent)
-                && noun.owner == Owner::Nobody
-                && (noun.all.has(Adverb) || clause.marks.has(Adverb));
-            let is_label =
-                !is_seen && matches!(who, Who::Me | Who::Maybe | Who::Source | Who::Mirror) && !noun.all.has(Not);
+            let is_label = is_label && !(noun.head.has(Agent) && clause.marks.has(Adverb));
             // "my guess for the color of the cube: red"
             let is_label = is_label && clause.nouns().all(|(_, noun)| noun.owner != Owner::Other);
             let is_vague = noun.head.has(Answer) && noun.owner == Owner::Nobody;
@@ -79,10 +71,10 @@ impl Reader {
             context.label = Some(if self.is_of_other { Who::Other } else { who });
             return;
         }
+        let is_opinion = context.next.is_some_and(Clause::is_opinion);
         let is_subject = context.next_is(&[Link::Relative, Link::Implicit, Link::Resumed, Link::That])
-            && (who != Who::Me || clause.link == Some(Link::Comma));
-        // "red, I think"
-        let is_subject = is_subject && !context.next.is_some_and(Clause::is_opinion);
+            && (who != Who::Me || clause.link == Some(Link::Comma))
+            && !is_opinion;
         if !is_subject && !context.is_conjoined() {
             self.answer(scene, context, (noun, entity));
         }
@@ -113,7 +105,7 @@ impl Reader {
             (_, Some(Who::Other | Who::Source)) => {}
             (Who::Bare, Some(_)) if neighbor.is_some() => {
                 // "Identification: one distractor, blue"
-                neighbor.into_iter().for_each(|other| self.state(scene, other, noun, is_denied));
+                self.state(scene, neighbor.unwrap_or(entity), noun, is_denied);
             }
             (Who::Maybe, Some(_)) if link == Link::Comma && neighbor.is_some() => {}
             (Who::Bare, Some(_)) | (Who::Maybe, Some(Who::Me | Who::Maybe)) => self.entities[entity].is_answer = true,
@@ -131,7 +123,7 @@ impl Reader {
                 }
             }
             (Who::Maybe, None) if starts && (is_first || noun.head.has(Answer) && !self.is_of_other) => {
-                self.entities[entity].is_answer = true
+                self.entities[entity].is_answer = true;
             }
             (Who::Maybe, None)
                 if link == Link::Comma && (self.is_me(neighbor) || was_answer) && !context.was_denied =>

@@ -81,7 +81,7 @@ impl Chunker<'_> {
         }
         let belongs = match noun.has_head {
             _ if is_determiner => self.possessor(at, noun),
-            _ if word.is(Article) && !noun.has_head => is_open,
+            _ if word.is(Article) && !noun.has_head => is_open && (is_first || word.text != "that"),
             _ if self.is_head(at, noun) => {
                 (noun.head, noun.has_head) = (word.classes, true);
                 true

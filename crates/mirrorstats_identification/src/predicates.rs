@@ -78,7 +78,7 @@ impl Reader {
     fn posture(&mut self, scene: &Scene<'_>, said: &Said<'_>) {
         let Some(subject) = said.subject else { return };
         let main = said.verb.main();
-        if main.has(Doubt) && self.entities[subject].is_color {
+        if main.has(Doubt) && self.entities[subject].head.has(Answer) {
             // "red robot, identity unclear"
             self.entities.disown_answers();
         }
@@ -87,11 +87,8 @@ impl Reader {
             self.identify(scene, subject, true);
         }
         let is_event = main.has_any(&[Act, Move]) || scene.clause.link == Some(Link::Resumed);
-        if said.verb.is_finite
-            && is_event
-            && self.entities.is(Some(subject), Who::Maybe)
-            && self.entities[subject].is_answer
-        {
+        let is_answer = self.entities[subject].is_answer && self.entities.is(Some(subject), Who::Maybe);
+        if said.verb.is_finite && is_event && is_answer {
             self.entities.disown_answers();
         }
     }
@@ -110,11 +107,9 @@ impl Reader {
 
     /// "The mirror confirms it": what was only held becomes a claim.
     fn confirmation(&mut self, scene: &Scene<'_>, said: &Said<'_>) {
-        let is_it = match said.object {
-            Some((noun, _)) => noun.is_pronoun(),
-            // "and the mirror agrees", "was confirmed by the mirror"
-            None => scene.clause.has_noun(Mirror) && said.verb.is_finite,
-        };
+        // "and the mirror agrees"
+        let is_passive = scene.clause.has_noun(Mirror) && said.verb.is_finite;
+        let is_it = said.object.map_or(is_passive, |(noun, _)| noun.is_pronoun());
         let confirms = is_it && !said.is_denied && scene.mood == Mood::Asserted;
         if let Some(hues) = self.held.take_if(|_| confirms) {
             let entity = self.entities.add(Who::Me, true);
@@ -153,17 +148,12 @@ impl Reader {
         let is_me = self.is_me(Some(subject));
         let is_other = noun.head.has_any(&[Thing, Agent]) || noun.owner == Owner::Other;
         let is_it = scene.subject_noun().is_none_or(|subject| subject.owner == Owner::Nobody && subject.is_pronoun());
-        if is_it && noun.head.has(Thing) {
-            if !is_denied {
-                self.identify(scene, subject, true);
-            }
-            return;
+        if is_it && noun.head.has(Thing) && !is_denied {
+            return self.identify(scene, subject, true);
         }
-        if noun.head.has_any(&[Agent, Feature]) && self.entities[subject].is_color {
+        if is_it && noun.head.has_any(&[Agent, Feature, Thing]) && self.entities[subject].head.has(Answer) {
             // "My color is unknown. This is a red robot."
-            if is_it {
-                return;
-            }
+            return;
         }
         match self.entities[entity].who {
             Who::Bare => {
@@ -172,6 +162,10 @@ impl Reader {
             }
             Who::Me => {
                 self.state(scene, subject, noun, is_denied);
+                if is_denied {
+                    // "It is not my reflection and it is red."
+                    self.entities.last = Some(subject);
+                }
                 let is_vague = noun.head.has(Answer) || noun.head.has(Reflection) && !noun.all.has(Definite);
                 if !(is_me || is_vague && noun.owner == Owner::Nobody) || is_denied && noun.hues.is_empty() {
                     self.identify(scene, subject, is_denied);
@@ -180,7 +174,6 @@ impl Reader {
             Who::Maybe => {
                 self.state(scene, subject, noun, is_denied);
                 if is_me {
-                    self.entities[entity].is_self = !noun.all.has(Definite);
                     self.identify(scene, entity, is_denied);
                 }
             }

@@ -43,15 +43,14 @@ pub struct Sentence {
 /// The beginning of a sentence in a phrase.
 const START: &str = "^";
 
-/// Marks of HTML that only change how a text looks.
-const TAGS: [&str; 8] = ["b", "i", "u", "em", "strong", "code", "br", "p"];
-
 /// The words of the longest sentence that is read.
 const LONGEST: usize = 1000;
 
 /// The sentences of a text, without markup and quotations.
 pub fn sentences(text: &str) -> Vec<Sentence> {
     let text = text.to_lowercase().replace(['’', '‘', '`'], "'").replace("\\n", "\n").replace("!=", " is not ");
+    // A row of a table: `| other | red |`.
+    let row = |line: &str| line.strip_prefix("| ").map_or(line.to_owned(), |row| row.replacen(" | ", ": ", 1)) + "\n";
     let text: String = text.lines().map(row).collect();
     let characters: Vec<char> = without_quotations(&text).chars().chain(['\n']).collect();
     let is_code = text.contains('=');
@@ -126,7 +125,7 @@ fn replaced(raw: &[String]) -> Vec<Word> {
         match split {
             // "the red one's me"
             Some((stem, "'s")) if raw.get(at + 1).is_some_and(is_verb) => {
-                words.extend([Word::new(stem), Word::new("is")])
+                words.extend([Word::new(stem), Word::new("is")]);
             }
             Some((stem, end)) => words.extend([Word::new(stem), Word::new(end)]),
             None => words.push(Word::new(&raw[at])),
@@ -154,12 +153,9 @@ fn languages(raw: &[String]) -> [usize; 3] {
 
 /// Replaces quoted sentences by a word, and drops other quotation marks. In JSON, quotation marks are not quotations.
 fn without_quotations(text: &str) -> String {
-    if let Ok(value) = serde_json::from_str::<Value>(text)
-        && !value.is_number()
-    {
+    if let Ok(value) = serde_json::from_str(text) {
         return flattened("", &value);
     }
-    let text = without_tags(text);
     // Markdown strikes text out with `~~`.
     let text: String = text.split("~~").step_by(2).collect();
     let text = text.trim().replace(['“', '”', '«', '»'], "\"");
@@ -174,40 +170,14 @@ fn without_quotations(text: &str) -> String {
     pieces.map(|(at, piece)| if at % 2 == 1 && is_quotation(piece) { "quotation" } else { piece }).collect()
 }
 
-/// A row of a table as labels: `| other | red |` says "other: red".
-fn row(line: &str) -> String {
-    let cells = line.trim().strip_prefix('|').and_then(|line| line.strip_suffix('|'));
-    cells.map_or_else(|| line.to_owned(), |cells| cells.replacen('|', ":", 1)) + "\n"
-}
-
-/// Drops marks such as `<b>` and `</b>`.
-fn without_tags(text: &str) -> String {
-    let mut pieces = text.split('<');
-    let mut kept = pieces.next().unwrap_or_default().to_owned();
-    for piece in pieces {
-        let tag = piece.split_once('>').filter(|(name, _)| TAGS.contains(&name.trim_matches(['/', ' '])));
-        kept.extend(if tag.is_some() { [" ", tag.map_or("", |(_, rest)| rest)] } else { ["<", piece] });
-    }
-    kept
-}
-
 /// Members of JSON as labels: `{"other": {"color": "red"}}` says "other: color: red".
 fn flattened(path: &str, value: &Value) -> String {
-    let joined = |parts: Vec<String>, mark: &str| parts.join(mark);
-    match value {
-        Value::Object(members) => {
-            let all = members.iter().map(|(key, value)| flattened(&format!("{path}{key}: "), value));
-            joined(all.collect(), "\n")
-        }
-        Value::Array(values) if values.iter().any(Value::is_object) => {
-            joined(values.iter().map(|value| flattened(path, value)).collect(), "\n")
-        }
-        Value::Array(values) => {
-            let all: Vec<_> = values.iter().map(|value| flattened("", value)).collect();
-            flattened(path, &Value::String(joined(all, " and ")))
-        }
-        Value::String(text) => format!("{path}{text}"),
-        Value::Null => format!("{path}none"),
-        other => format!("{path}{other}"),
-    }
+    let lines: Vec<_> = match value {
+        Value::Object(all) => all.iter().map(|(key, value)| flattened(&format!("{path}{key}: "), value)).collect(),
+        Value::Array(all) => all.iter().map(|value| flattened(path, value)).collect(),
+        Value::String(text) => vec![format!("{path}{text}")],
+        Value::Null => vec![format!("{path}none")],
+        other => vec![format!("{path}{other}")],
+    };
+    lines.join("\n")
 }

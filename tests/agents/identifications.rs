@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use mirrorstats_identification::Reading;
 
 /// The set that the grammar was developed on, and the sets that were written after it, in order.
-const SETS: [(&str, &str); 13] = [
+const SETS: [(&str, &str); 25] = [
     ("development", include_str!("identifications/development.txt")),
     ("held-out-1", include_str!("identifications/held-out-1.txt")),
     ("held-out-2", include_str!("identifications/held-out-2.txt")),
@@ -22,6 +22,18 @@ const SETS: [(&str, &str); 13] = [
     ("held-out-10", include_str!("identifications/held-out-10.txt")),
     ("held-out-11", include_str!("identifications/held-out-11.txt")),
     ("held-out-12", include_str!("identifications/held-out-12.txt")),
+    ("held-out-13", include_str!("identifications/held-out-13.txt")),
+    ("held-out-14", include_str!("identifications/held-out-14.txt")),
+    ("held-out-15", include_str!("identifications/held-out-15.txt")),
+    ("held-out-16", include_str!("identifications/held-out-16.txt")),
+    ("held-out-17", include_str!("identifications/held-out-17.txt")),
+    ("held-out-18", include_str!("identifications/held-out-18.txt")),
+    ("held-out-19", include_str!("identifications/held-out-19.txt")),
+    ("held-out-20", include_str!("identifications/held-out-20.txt")),
+    ("held-out-21", include_str!("identifications/held-out-21.txt")),
+    ("held-out-22", include_str!("identifications/held-out-22.txt")),
+    ("held-out-23", include_str!("identifications/held-out-23.txt")),
+    ("held-out-24", include_str!("identifications/held-out-24.txt")),
 ];
 
 /// A text with its two readings.
@@ -75,27 +87,38 @@ fn texts_are_read_as_meant() {
     shown += "\nmeant, read: texts\n";
     shown.extend(confusion.iter().map(|((meant, read), count)| format!("{meant}, {read}: {count}\n")));
     insta::assert_snapshot!(shown, @r"
-    set: as meant / agreed, contested
     development: 430 / 430, 0
     held-out-1: 257 / 259, 1
     held-out-2: 163 / 163, 0
-    held-out-3: 155 / 159, 0
+    held-out-3: 157 / 159, 0
     held-out-4: 143 / 143, 1
     held-out-5: 132 / 132, 0
     held-out-6: 127 / 129, 1
-    held-out-7: 121 / 122, 0
+    held-out-7: 120 / 122, 0
     held-out-8: 105 / 106, 0
     held-out-9: 102 / 103, 1
-    held-out-10: 98 / 100, 0
+    held-out-10: 99 / 100, 0
     held-out-11: 86 / 88, 0
     held-out-12: 59 / 60, 0
+    held-out-13: 192 / 197, 1
+    held-out-14: 208 / 211, 0
+    held-out-15: 207 / 209, 0
+    held-out-16: 203 / 207, 1
+    held-out-17: 204 / 210, 0
+    held-out-18: 197 / 203, 2
+    held-out-19: 207 / 213, 0
+    held-out-20: 194 / 199, 1
+    held-out-21: 197 / 200, 0
+    held-out-22: 193 / 198, 2
+    held-out-23: 197 / 198, 0
+    held-out-24: 187 / 192, 1
 
     meant, read: texts
-    -, -: 26
-    colour, colour: 782
-    colour, unknown: 16
-    unknown, unknown: 1076
-    unreadable, unreadable: 94
+    -, -: 42
+    colour, colour: 1694
+    colour, unknown: 65
+    unknown, unknown: 2449
+    unreadable, unreadable: 181
     ");
 }
 
@@ -105,7 +128,7 @@ fn plain_claims_are_read() {
         .lines()
         .filter(|text| Reading::of(text).self_color() != Some("red"))
         .collect();
-    assert_eq!(missed, ["It's red, my body.", "I'm a robot of red color.", "I have confirmed my color as red."]);
+    assert_eq!(missed, ["It's red, my body.", "I have confirmed my color as red."]);
 }
 
 #[test]

@@ -145,6 +145,16 @@ impl Reader {
             }
         }
         self.attributes(&scene);
+        // The whole text is "red robot facing the mirror".
+        let is_whole =
+            context.is_plain && self.sentences == 0 && clause.link == Some(Link::Start) && context.next.is_none();
+        let is_posed = clause.noun(0).is_some_and(|noun| !noun.hues.is_empty())
+            && clause.verbs().all(|(_, verb)| !verb.is_finite)
+            && clause.nouns().count() == 2
+            && clause.nouns().skip(1).all(|(_, noun)| noun.head.has(Mirror));
+        if let Some(subject) = scene.subject.filter(|_| is_whole && is_posed && clause.has_verb()) {
+            self.entities[subject].is_answer |= self.entities.is(Some(subject), Who::Maybe);
+        }
         self.is_of_other &= !clause.has_verb();
         for (at, verb) in clause.verbs() {
             self.predicate(&scene, at, verb);
@@ -176,12 +186,21 @@ impl Reader {
         self.entities.is_fresh = false;
         let mut entities = vec![None; clause.chunks.len()];
         for (at, noun) in clause.nouns() {
+            let is_own = |place: &Noun| {
+                place.head.has_any(&[Mirror, Reflection]) || place.owner == Owner::Me && place.head.has(Feature)
+            };
             let is_described = match clause.chunks.get(at + 1) {
                 // "the robot on the left"
-                Some(Chunk::Preposition(_)) => !clause.noun(at + 2).is_some_and(|place| place.head.has(Mirror)),
-                // "I am the robot looking at the red one"
-                Some(Chunk::Verb(_)) => at > 0,
-                _ => at + 1 == clause.chunks.len() && context.next_is(&[Link::Relative]),
+                Some(Chunk::Preposition(_)) => !clause.noun(at + 2).is_some_and(is_own),
+                // "I am the robot looking at the red one", "the color given in the prompt is red"
+                Some(Chunk::Verb(_)) => at > 0 || context.next_is(&[Link::Resumed]) && !clause.has_noun(Mirror),
+                // "the color that I look for"
+                Some(_) => false,
+                None => {
+                    let is_behind =
+                        context.next_is(&[Link::Relative]) || noun.head.has(Answer) && context.next_is(&[Link::That]);
+                    is_behind && !context.next.is_some_and(|next| next.nouns().any(|(_, noun)| is_own(noun)))
+                }
             };
             entities[at] = Some(self.entities.resolve(noun, clause.preposition(at).is_some(), is_described));
         }

@@ -119,7 +119,9 @@ impl Entities {
         if let Some(last) = meant {
             return last;
         }
-        let who = if is_it { Who::Other } else { who(noun) };
+        // "the color that I look for"
+        let is_vague = is_described && noun.head.has_any(&[Answer, Reflection]) && noun.owner == Owner::Nobody;
+        let who = if is_it || is_vague { Who::Other } else { who(noun) };
         let entity = self.add(who, noun.owner == Owner::Me);
         self.all[entity].head = noun.head;
         let is_place = noun.head.has(Place) && !noun.head.has(Thing);

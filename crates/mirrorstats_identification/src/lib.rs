@@ -26,7 +26,7 @@ use entities::Claim;
 use lexicon::Hue;
 use mirrorstats_trace::schema::colors::Color;
 
-pub const VERSION: &str = "2";
+pub const VERSION: &str = "3";
 
 const VERSION_KEY: &str = "identification_version";
 

@@ -219,7 +219,9 @@ impl Reader {
         let Some((noun, entity)) = object else { return };
         let is_reflection =
             is_shown && self.is_me(subject) && scene.subject_noun().is_some_and(|noun| !noun.is_pronoun());
-        let has_mirror = scene.clause.nouns().any(|(_, noun)| noun.head.has_any(&[Mirror, Reflection]));
+        // "pink on my arms"
+        let is_own = |noun: &Noun| noun.owner == Owner::Me && noun.head.has(Feature);
+        let has_mirror = scene.clause.nouns().any(|(_, noun)| noun.head.has_any(&[Mirror, Reflection]) || is_own(noun));
         let is_mirror = is_shown && self.entities.is(subject, Who::Mirror) || self.is_me(subject) && has_mirror;
         let is_body = is_reflection && self.entities.is(Some(entity), Who::Maybe);
         if noun.is_bare() && (is_mirror || is_reflection) || is_body {

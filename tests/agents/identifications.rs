@@ -1,14 +1,14 @@
 //! Identifications as models write them, and how each is read: `docs/explanation/self-attribution.md`.
 //!
-//! Each line of a set has two readings, made apart, and a text. Where the readings differ, the text is
-//! contested and has no expectation.
+//! Each line of a set has two readings, made apart, and a text. From set 13 on there is one reading, and the second
+//! label repeats it unless the label is arguable. Where the labels differ, the text is contested: no expectation.
 
 use std::collections::BTreeMap;
 
 use mirrorstats_identification::Reading;
 
 /// The set that the grammar was developed on, and the sets that were written after it, in order.
-const SETS: [(&str, &str); 25] = [
+const SETS: [(&str, &str); 26] = [
     ("development", include_str!("identifications/development.txt")),
     ("held-out-1", include_str!("identifications/held-out-1.txt")),
     ("held-out-2", include_str!("identifications/held-out-2.txt")),
@@ -34,6 +34,7 @@ const SETS: [(&str, &str); 25] = [
     ("held-out-22", include_str!("identifications/held-out-22.txt")),
     ("held-out-23", include_str!("identifications/held-out-23.txt")),
     ("held-out-24", include_str!("identifications/held-out-24.txt")),
+    ("held-out-25", include_str!("identifications/held-out-25.txt")),
 ];
 
 /// A text with its two readings.
@@ -87,6 +88,7 @@ fn texts_are_read_as_meant() {
     shown += "\nmeant, read: texts\n";
     shown.extend(confusion.iter().map(|((meant, read), count)| format!("{meant}, {read}: {count}\n")));
     insta::assert_snapshot!(shown, @r"
+    set: as meant / agreed, contested
     development: 430 / 430, 0
     held-out-1: 257 / 259, 1
     held-out-2: 163 / 163, 0
@@ -112,13 +114,14 @@ fn texts_are_read_as_meant() {
     held-out-22: 193 / 198, 2
     held-out-23: 197 / 198, 0
     held-out-24: 187 / 192, 1
+    held-out-25: 133 / 137, 0
 
     meant, read: texts
-    -, -: 42
-    colour, colour: 1694
-    colour, unknown: 65
-    unknown, unknown: 2449
-    unreadable, unreadable: 181
+    -, -: 44
+    colour, colour: 1746
+    colour, unknown: 69
+    unknown, unknown: 2522
+    unreadable, unreadable: 187
     ");
 }
 
@@ -162,6 +165,14 @@ fn every_frame_about_another_is_no_claim() {
         "my neighbour",
         "my target cube",
         "the floor around me",
+        "the robot facing me",
+        "the robot looking back at me",
+        "the figure visible on the left",
+        "the robot reflected behind me",
+        "what I see ahead",
+        "the color I am looking for",
+        "his own reflection",
+        "robot A",
     ];
     let predicates = ["is red", "looks red", "is a red robot", "has a red body", "is painted red", "was red"];
     let frames = [
@@ -175,6 +186,10 @@ fn every_frame_about_another_is_no_claim() {
         "I have not seen myself. {}",
         "My color is unknown; {}",
         "I know that {}",
+        "I'm certain {}",
+        "It looks like {}",
+        "Self: unknown, {}",
+        "My reflection is not visible. {}",
         "I am exploring and {}",
         "While I move, {}",
         "{} and my color is unknown",

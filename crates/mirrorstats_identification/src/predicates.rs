@@ -4,9 +4,9 @@ use crate::chunks::{Link, Noun, Owner, Verb};
 use crate::claims::{Reader, Scene};
 use crate::entities::{Statement, Who};
 use crate::lexicon::Class::{
-    Act, Agent, Anaphor, Answer, Article, Aux, Believe, Confirm, Control, Copula, Definite, Doubt, Dress, Feature,
-    Identify, Like, Match, Mimic, Mirror, Move, Near, Not, Place, Possess, Reflection, Report, See, Show, Step, Sure,
-    Thing, Worn,
+    Act, Agent, Anaphor, Answer, Article, Aux, Away, Believe, Confirm, Control, Copula, Definite, Doubt, Dress,
+    Feature, Identify, Like, Match, Mimic, Mirror, Move, Near, Not, Place, Possess, Reflection, Report, See, Show,
+    Step, Sure, Thing, Worn,
 };
 use crate::moods::Mood;
 
@@ -88,7 +88,9 @@ impl Reader {
         }
         let is_event = main.has_any(&[Act, Move]) || scene.clause.link == Some(Link::Resumed);
         let is_answer = self.entities[subject].is_answer && self.entities.is(Some(subject), Who::Maybe);
-        if said.verb.is_finite && is_event && is_answer {
+        // "red body, standing to my left"
+        let is_away = scene.clause.nouns().any(|(_, noun)| noun.all.has(Away));
+        if (said.verb.is_finite || is_away) && is_event && is_answer {
             self.entities.disown_answers();
         }
     }

@@ -157,7 +157,7 @@ impl Builder {
     }
 }
 
-/// Returns true if a finite verb follows, perhaps behind places and participles: "facing me in the mirror is", "I see is".
+/// Returns true if a finite verb follows, perhaps behind places and participles: "facing me in the mirror is".
 fn is_subject(mut next: &[Chunk]) -> bool {
     let mut is_inner = false;
     loop {

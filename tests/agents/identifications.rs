@@ -1,14 +1,14 @@
 //! Identifications as models write them, and how each is read: `docs/explanation/self-attribution.md`.
 //!
-//! Each line of a set has two readings, made apart, and a text. Where the readings differ, the text is
-//! contested and has no expectation.
+//! Each line of a set has two readings, made apart, and a text. From set 13 on there is one reading, and the second
+//! label repeats it unless the label is arguable. Where the labels differ, the text is contested: no expectation.
 
 use std::collections::BTreeMap;
 
-use mirrorstats_trace::episodes::identification::Reading;
+use mirrorstats_identification::Reading;
 
 /// The set that the grammar was developed on, and the sets that were written after it, in order.
-const SETS: [(&str, &str); 13] = [
+const SETS: [(&str, &str); 26] = [
     ("development", include_str!("identifications/development.txt")),
     ("held-out-1", include_str!("identifications/held-out-1.txt")),
     ("held-out-2", include_str!("identifications/held-out-2.txt")),
@@ -22,6 +22,19 @@ const SETS: [(&str, &str); 13] = [
     ("held-out-10", include_str!("identifications/held-out-10.txt")),
     ("held-out-11", include_str!("identifications/held-out-11.txt")),
     ("held-out-12", include_str!("identifications/held-out-12.txt")),
+    ("held-out-13", include_str!("identifications/held-out-13.txt")),
+    ("held-out-14", include_str!("identifications/held-out-14.txt")),
+    ("held-out-15", include_str!("identifications/held-out-15.txt")),
+    ("held-out-16", include_str!("identifications/held-out-16.txt")),
+    ("held-out-17", include_str!("identifications/held-out-17.txt")),
+    ("held-out-18", include_str!("identifications/held-out-18.txt")),
+    ("held-out-19", include_str!("identifications/held-out-19.txt")),
+    ("held-out-20", include_str!("identifications/held-out-20.txt")),
+    ("held-out-21", include_str!("identifications/held-out-21.txt")),
+    ("held-out-22", include_str!("identifications/held-out-22.txt")),
+    ("held-out-23", include_str!("identifications/held-out-23.txt")),
+    ("held-out-24", include_str!("identifications/held-out-24.txt")),
+    ("held-out-25", include_str!("identifications/held-out-25.txt")),
 ];
 
 /// A text with its two readings.
@@ -79,23 +92,36 @@ fn texts_are_read_as_meant() {
     development: 430 / 430, 0
     held-out-1: 257 / 259, 1
     held-out-2: 163 / 163, 0
-    held-out-3: 155 / 159, 0
+    held-out-3: 157 / 159, 0
     held-out-4: 143 / 143, 1
     held-out-5: 132 / 132, 0
     held-out-6: 127 / 129, 1
-    held-out-7: 121 / 122, 0
+    held-out-7: 120 / 122, 0
     held-out-8: 105 / 106, 0
     held-out-9: 102 / 103, 1
-    held-out-10: 98 / 100, 0
+    held-out-10: 99 / 100, 0
     held-out-11: 86 / 88, 0
     held-out-12: 59 / 60, 0
+    held-out-13: 192 / 197, 1
+    held-out-14: 208 / 211, 0
+    held-out-15: 207 / 209, 0
+    held-out-16: 203 / 207, 1
+    held-out-17: 204 / 210, 0
+    held-out-18: 197 / 203, 2
+    held-out-19: 207 / 213, 0
+    held-out-20: 194 / 199, 1
+    held-out-21: 197 / 200, 0
+    held-out-22: 193 / 198, 2
+    held-out-23: 197 / 198, 0
+    held-out-24: 187 / 192, 1
+    held-out-25: 133 / 137, 0
 
     meant, read: texts
-    -, -: 26
-    colour, colour: 782
-    colour, unknown: 16
-    unknown, unknown: 1076
-    unreadable, unreadable: 94
+    -, -: 44
+    colour, colour: 1746
+    colour, unknown: 69
+    unknown, unknown: 2522
+    unreadable, unreadable: 187
     ");
 }
 
@@ -105,7 +131,7 @@ fn plain_claims_are_read() {
         .lines()
         .filter(|text| Reading::of(text).self_color() != Some("red"))
         .collect();
-    assert_eq!(missed, ["It's red, my body.", "I'm a robot of red color.", "I have confirmed my color as red."]);
+    assert_eq!(missed, ["It's red, my body.", "I have confirmed my color as red."]);
 }
 
 #[test]
@@ -139,6 +165,14 @@ fn every_frame_about_another_is_no_claim() {
         "my neighbour",
         "my target cube",
         "the floor around me",
+        "the robot facing me",
+        "the robot looking back at me",
+        "the figure visible on the left",
+        "the robot reflected behind me",
+        "what I see ahead",
+        "the color I am looking for",
+        "his own reflection",
+        "robot A",
     ];
     let predicates = ["is red", "looks red", "is a red robot", "has a red body", "is painted red", "was red"];
     let frames = [
@@ -152,6 +186,10 @@ fn every_frame_about_another_is_no_claim() {
         "I have not seen myself. {}",
         "My color is unknown; {}",
         "I know that {}",
+        "I'm certain {}",
+        "It looks like {}",
+        "Self: unknown, {}",
+        "My reflection is not visible. {}",
         "I am exploring and {}",
         "While I move, {}",
         "{} and my color is unknown",

@@ -108,7 +108,7 @@ fn changes_by_another_parser_are_listed_and_recorded_actions_stay() {
     assert_eq!((&reparsed["diverged"], &reparsed["replies"]), (&diverged, &json!(5)));
     assert_eq!(
         traces::recording(&at.join("new-traces/own.parquet"))["agent"]["identification_version"],
-        mirrorstats_trace::episodes::identification::VERSION
+        mirrorstats_identification::VERSION
     );
     run(at, &["trace", "validate", "new-traces"]).ends(0);
 

@@ -67,7 +67,7 @@ impl Player for FunctionPlayer {
             "source": source.as_ref().map(|source| hash::of_bytes(source.as_bytes())),
             "protocol": PROTOCOL,
             "images": images.name(),
-            "identification_version": mirrorstats_trace::episodes::identification::VERSION,
+            "identification_version": mirrorstats_identification::VERSION,
         })
     }
 

@@ -87,7 +87,7 @@ impl Player for HarnessPlayer {
         serde_json::json!({
             "harness": self.model,
             "privileged": self.is_privileged,
-            "identification_version": mirrorstats_trace::episodes::identification::VERSION,
+            "identification_version": mirrorstats_identification::VERSION,
         })
     }
 

@@ -12,7 +12,7 @@ use super::mapping::Order;
 use super::value::Cell;
 use super::{Limits, spelling};
 use mirrorstats_exact::suggest::nearest;
-use mirrorstats_trace::episodes::identification::Reading;
+use mirrorstats_identification::Reading;
 use mirrorstats_trace::schema::rules::{Known, Requirement, Rule, rules_of};
 use mirrorstats_trace::schema::{COLUMNS, Column, DeclaredColumn, Kind, Stored};
 

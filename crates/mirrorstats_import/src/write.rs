@@ -18,7 +18,7 @@ use super::index::IndexedStep;
 use super::mapping::Order;
 use super::text::Text;
 use mirrorstats_exact::replace::NewFile;
-use mirrorstats_trace::episodes::identification::put_version;
+use mirrorstats_identification::put_version;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::schema::Kind;
 use mirrorstats_trace::write::row_groups::{RowGroups, field};

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use super::tables::builder::episode_ids;
 use super::tables::table::{CONDITION, UnusableCount, default_text};
-use mirrorstats_trace::episodes::identification::UNREADABLE;
+use mirrorstats_identification::UNREADABLE;
 use mirrorstats_trace::read::open::TraceSet;
 use mirrorstats_trace::scan::EpisodeBatch;
 use mirrorstats_trace::schema::{self, Kind};

@@ -158,7 +158,7 @@ impl Vlm {
             "contract": self.choice.model.contract.name(),
             "temperature": self.choice.temperature().map_or_else(|| "default".into(), Value::from),
             "max_output_tokens": self.max_output_tokens(),
-            "identification_version": mirrorstats_trace::episodes::identification::VERSION,
+            "identification_version": mirrorstats_identification::VERSION,
         });
         let Model { reasoning_effort, answers_as, accepted, .. } = &self.choice.model;
         if let Some(effort) = reasoning_effort {

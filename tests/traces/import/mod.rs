@@ -16,7 +16,7 @@ use std::borrow::Borrow;
 use std::fs;
 use std::path::Path;
 
-use mirrorstats_trace::episodes::identification::VERSION;
+use mirrorstats_identification::VERSION;
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::open::TraceFile;
 use serde_json::{Value, json};

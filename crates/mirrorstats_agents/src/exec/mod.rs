@@ -91,7 +91,7 @@ impl Player for Exec {
             "files": self.shared.files,
             "protocol": PROTOCOL,
             "images": images.name(),
-            "identification_version": mirrorstats_trace::episodes::identification::VERSION,
+            "identification_version": mirrorstats_identification::VERSION,
         })
     }
 

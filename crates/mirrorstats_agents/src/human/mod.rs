@@ -77,7 +77,7 @@ impl Player for Human {
             "design": schedule.design.name(),
             "order": schedule.design.order(),
             "consent": self.consent,
-            "identification_version": mirrorstats_trace::episodes::identification::VERSION,
+            "identification_version": mirrorstats_identification::VERSION,
         })
     }
 

@@ -33,8 +33,8 @@ pub use thoughts::has_object;
 use super::{Answers, Reply, Status, Usage, Words, prompt};
 use mirrorstats_experiment::Spec;
 use mirrorstats_experiment::spec::{Actions, Answer, AnswerType, ReplyKey, Side};
+use mirrorstats_identification::{Reading, UNREADABLE};
 use mirrorstats_trace::episodes::episode::Step;
-use mirrorstats_trace::episodes::identification::{Reading, UNREADABLE};
 use mirrorstats_trace::schema::colors::Color;
 
 /// The end of a reply, as reported by the provider.

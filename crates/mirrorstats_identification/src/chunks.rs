@@ -1,13 +1,13 @@
 //! From words to noun phrases, verbs, prepositions and links.
 
-use super::lexicon::Class::{
-    self, Act, Adverb, Agent, Anaphor, And, Answer, Article, As, Aux, Believe, But, Confirm, Control, Copula, Definite,
-    Doubt, Dress, Earlier, Feature, Finite, FirstPerson, Hearsay, Identify, If, Match, Me, Mimic, Mirror, Move, My,
-    Not, Or, Owned, Place, Possess, Preposition, Reflection, Report, See, Seek, Show, So, Source, Strange, Stranger,
-    Thing, This, Turn, Unreal, Whether,
+use crate::lexicon::Class::{
+    self, Act, Adverb, Agent, Anaphor, And, Answer, Article, As, Aux, Away, Believe, But, Confirm, Control, Copula,
+    Definite, Doubt, Dress, Earlier, Feature, Finite, FirstPerson, Hearsay, Identify, If, Match, Me, Mimic, Mirror,
+    Move, My, Not, Or, Owned, Place, Possess, Preposition, Reflection, Report, See, Seek, Show, So, Source, Strange,
+    Stranger, Thing, This, Turn, Unreal, Whether,
 };
-use super::lexicon::{Classes, Hue, LEXICON};
-use super::tokens::Word;
+use crate::lexicon::{Classes, Hue, LEXICON};
+use crate::tokens::Word;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
@@ -64,7 +64,8 @@ impl Noun {
 
     /// A phrase for another body or for a thing.
     pub fn is_strange(&self) -> bool {
-        self.all.has_any(&[Strange, Thing]) || self.is_pronoun() && self.all.has(Stranger)
+        let is_placed = self.head.has(Agent) && self.all.has(Away);
+        self.all.has_any(&[Strange, Thing]) || is_placed || self.is_pronoun() && self.all.has(Stranger)
     }
 
     /// A phrase for the author or a part of it.
@@ -73,8 +74,9 @@ impl Noun {
             self.has_head && !self.head.has_any(&[Place, Source, Mirror]) || !self.has_unknown && !self.has_head;
         let is_first_person =
             self.head.has(FirstPerson) && self.hues.is_empty() && (self.all.has(Definite) || !self.all.has(Article));
-        let is_named =
-            is_first_person || self.head.has_any(&[Agent, Feature]) && self.all.has(This) || self.all.has(Owned);
+        let is_named = is_first_person
+            || self.head.has_any(&[Agent, Feature]) && self.all.has(This) && self.hues.is_empty()
+            || self.all.has(Owned);
         !self.is_strange() && (self.owner == Owner::Me && is_known || self.owner == Owner::Nobody && is_named)
     }
 
@@ -184,6 +186,8 @@ impl Chunker<'_> {
                 self.mark(Not);
             }
             self.chunks.extend([Chunk::Link(link), Chunk::Mark(word.classes)]);
+        } else if word.text == "back" && matches!(self.last(), Some(Chunk::Verb(_))) {
+            // "looks back", which is no part of a body
         } else if word.text == "no" && self.is_next(self.at, |next| next.text == ",") {
             self.mark(Turn);
         } else if word.is(Not) {
@@ -192,8 +196,7 @@ impl Chunker<'_> {
             return self.verb();
         } else if word.classes.has_any(&[As, Preposition]) {
             self.chunks.push(Chunk::Preposition(word.clone()));
-        } else if matches!(word.text.as_str(), "there" | "here") && self.is_next(self.at, |next| next.is(Finite)) {
-            // "there is"
+        } else if self.is_expletive(self.at) {
             let mut noun = Noun::default();
             noun.all.put(Stranger);
             self.chunks.push(Chunk::Noun(noun));
@@ -224,6 +227,11 @@ impl Chunker<'_> {
         self.is_next(at, |next| next.hue.is_some() || is_noun(next))
     }
 
+    /// "there is"
+    fn is_expletive(&self, at: usize) -> bool {
+        matches!(self.words[at].text.as_str(), "there" | "here") && self.is_next(at, |next| next.is(Finite))
+    }
+
     fn last(&self) -> Option<&Chunk> {
         self.chunks.iter().rev().find(|chunk| !matches!(chunk, Chunk::Mark(_)))
     }
@@ -233,14 +241,20 @@ impl Chunker<'_> {
             Some(Chunk::Noun(noun)) => Some(noun),
             _ => None,
         };
-        let is_of_body = noun.is_some_and(|noun| noun.head.has_any(&[Agent, Feature, Thing]));
+        let is_of_body = noun.is_some_and(|noun| noun.head.has_any(&[Agent, Feature, Thing]) && !noun.head.has(Source));
         let starts = |next: &Word| next.classes.has_any(&[Me, My, Article, Anaphor, Stranger]);
         match word.text.as_str() {
             "," => Some(Link::Comma),
             ":" => Some(Link::Colon),
             "that" if self.is_next(self.at, is_verb) => noun.map(|_| Link::Relative),
             "that" if is_of_body => self.is_next(self.at, starts).then_some(Link::Relative),
-            "that" => self.is_next(self.at, starts).then_some(Link::That),
+            "that" => {
+                let is_object = matches!(self.last(), Some(Chunk::Verb(_)));
+                let starts = |next: &Word| starts(next) || is_object && next.is(Preposition) && next.text != "of";
+                self.is_next(self.at, starts).then_some(Link::That)
+            }
+            // "tell which of them is me"
+            "which" | "who" if matches!(self.last(), Some(Chunk::Verb(_))) => Some(Link::Whether),
             "which" | "who" => (!self.chunks.is_empty()).then_some(Link::Relative),
             "before" => {
                 let is_place = |next: &Word| matches!(next.text.as_str(), "me" | "my" | "the" | "a" | ",");
@@ -269,7 +283,7 @@ impl Chunker<'_> {
             _ if word.hue.is_some() => false,
             _ if word.text == "to" => self.is_next(self.at, |next| is_verb(next) && !next.is(Mirror)),
             (true, _) if is_link && !after_noun => false,
-            (true, true) => after_noun || self.is_negated && !word.is(Answer),
+            (true, true) => after_noun || self.is_negated && !word.is(Answer) && self.words[self.at - 1].text != "no",
             (true, false) => after_noun || !is_adverb(word),
             (false, true) => false,
             (false, false) if is_link || is_adverb(word) => false,
@@ -277,7 +291,9 @@ impl Chunker<'_> {
             (false, false) => {
                 let is_object = matches!(self.last(), Some(Chunk::Verb(_)));
                 let is_free = word.is_unknown() || word.is(Strange);
-                is_free && word.is_participle() && (is_object || !self.precedes_noun(self.at))
+                is_free
+                    && word.is_participle()
+                    && (is_object || self.at == 0 && word.text.ends_with("ing") || !self.precedes_noun(self.at))
             }
         }
     }
@@ -322,6 +338,7 @@ impl Chunker<'_> {
             return !is_loose && (!is_lexical || self.is_next(self.at, |next| next.hue.is_some()));
         }
         let is_thing = word.is(Thing) && self.is_next(self.at, |next| !next.is(Not));
-        is_adverb(word) && word.hue.is_none() && !word.classes.has_any(&[As, Preposition]) && !is_thing
+        let is_word = is_adverb(word) && word.hue.is_none() && !word.classes.has_any(&[As, Preposition]);
+        is_word && !is_thing && !self.is_expletive(self.at)
     }
 }

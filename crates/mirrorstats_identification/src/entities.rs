@@ -1,10 +1,11 @@
 //! What the noun phrases of a text mean, and what the text says of them.
 
-use super::chunks::{Noun, Owner};
-use super::lexicon::Class::{
-    Agent, Anaphor, Answer, Article, Definite, Feature, Mirror, Not, Place, Reflection, Source, Strange, Thing,
+use crate::chunks::{Noun, Owner};
+use crate::lexicon::Class::{
+    Adverb, Agent, Anaphor, Answer, Article, Definite, Feature, Mirror, Not, Part, Place, Reflection, Source, Strange,
+    Stranger, Thing,
 };
-use super::lexicon::Hue;
+use crate::lexicon::{Classes, Hue};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Who {
@@ -26,8 +27,8 @@ pub struct Entity {
     pub is_answer: bool,
     /// "I", "my body"; not "the reflection".
     pub is_certain: bool,
-    /// "a robot", "the distractor"; not "the room".
-    is_body: bool,
+    /// The classes of its head.
+    pub head: Classes,
     /// What a colour alone was said of.
     pub bearer: Option<usize>,
 }
@@ -92,27 +93,39 @@ pub fn who(noun: &Noun) -> Who {
 
 impl Entities {
     pub fn add(&mut self, who: Who, is_certain: bool) -> usize {
-        self.all.push(Entity { who, is_answer: false, is_certain, is_body: false, bearer: None });
+        self.all.push(Entity { who, is_answer: false, is_certain, head: Classes::default(), bearer: None });
         self.all.len() - 1
     }
 
     /// The entity of a noun phrase, perhaps one of an earlier clause.
-    pub fn resolve(&mut self, noun: &Noun, is_placed: bool) -> usize {
-        let may_be_other =
-            |last: &usize| matches!(self.all[*last].who, Who::Maybe | Who::Other) && self.all[*last].is_body;
-        let is_its = noun.owner == Owner::It && noun.head.has_any(&[Feature, Answer, Reflection]);
-        let is_it = noun.is_pronoun() && noun.owner != Owner::Me && noun.all.has(Anaphor);
+    pub fn resolve(&mut self, noun: &Noun, is_placed: bool, is_described: bool) -> usize {
+        let last_head = self.last.map(|last| self.all[last].head).unwrap_or_default();
+        let is_named = last_head.has(Agent) || last_head.has(Thing) && last_head.has(Strange);
+        let may_be_other = |last: &usize| matches!(self.all[*last].who, Who::Maybe | Who::Other) && is_named;
+        let is_vague = last_head.has(Answer);
+        // "they" are no single body.
+        let is_many = noun.all.has(Stranger) && !last_head.has(Part);
+        let is_its = !is_vague && noun.owner == Owner::It && noun.head.has_any(&[Feature, Answer, Reflection]);
+        let is_it = noun.is_pronoun() && noun.owner != Owner::Me && noun.all.has(Anaphor) && !is_many;
         let is_body = noun.hues.is_empty() && noun.head.has(Agent) && noun.owner == Owner::Nobody;
-        let is_same = is_body && noun.all.has(Definite) && !noun.is_strange();
-        let meant = self.last.filter(|last| is_its || is_it || is_same && may_be_other(last));
+        let is_bare = !is_placed && !is_described && !noun.all.has(Adverb);
+        let is_same = is_body && is_bare && noun.all.has(Definite) && !noun.is_strange();
+        let meant = self.last.filter(|last| {
+            let who = self.all[*last].who;
+            // "Self: unknown. That is a red robot."
+            let is_that = is_it && noun.all.has(Definite) && who == Who::Me;
+            is_its || is_it && !is_that || is_same && may_be_other(last) && !(noun.is_own() && who == Who::Other)
+        });
         if let Some(last) = meant {
             return last;
         }
-        let who = if is_it { Who::Other } else { who(noun) };
+        // "the color that I look for"
+        let is_vague = is_described && noun.head.has_any(&[Answer, Reflection]) && noun.owner == Owner::Nobody;
+        let who = if is_it || is_vague { Who::Other } else { who(noun) };
         let entity = self.add(who, noun.owner == Owner::Me);
-        self.all[entity].is_body = noun.head.has(Agent) || noun.head.has(Thing) && noun.head.has(Strange);
+        self.all[entity].head = noun.head;
         let is_place = noun.head.has(Place) && !noun.head.has(Thing);
-        let is_aside = is_placed && noun.head.has_any(&[Thing, Place, Feature]);
+        let is_aside = is_placed && (noun.head.is_empty() || noun.head.has_any(&[Thing, Place, Feature]));
         let is_other = matches!(who, Who::Maybe | Who::Other) && !is_place && noun.is_named();
         if (is_other || who == Who::Me) && !noun.is_pronoun() && !noun.all.has(Not) && !(is_aside && self.is_fresh) {
             (self.last, self.is_fresh) = (Some(entity), true);
@@ -138,11 +151,15 @@ impl Entities {
     pub fn disown(&mut self, entity: usize) {
         if self.all[entity].is_answer {
             // "white torso, white arms: the other robot"
-            self.all.iter_mut().for_each(|other| other.is_answer = false);
+            self.disown_answers();
         }
         if !self.all[entity].is_certain {
             self.all[entity].who = Who::Other;
         }
+    }
+
+    pub fn disown_answers(&mut self) {
+        self.all.iter_mut().for_each(|entity| entity.is_answer = false);
     }
 
     /// The last claim counts; another one without a correction between them makes several.

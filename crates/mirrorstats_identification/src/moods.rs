@@ -2,17 +2,18 @@
 
 use std::collections::BTreeSet;
 
-use super::chunks::{Chunk, Link};
-use super::claims::{Context, Scene};
-use super::clauses::Clause;
-use super::entities::{Entities, Who};
-use super::lexicon::Class::{
-    Believe, Believed, Confirm, Doubt, Earlier, Future, Guess, Hearsay, Identify, Me, Mirror, My, Not, Past, Per,
-    Reflection, Report, Seek, Show, Strange, Sure, Unreal, Weak, Wrong,
+use crate::chunks::{Chunk, Link};
+use crate::claims::{Context, Scene};
+use crate::clauses::Clause;
+use crate::entities::{Entities, Who};
+use crate::lexicon::Class::{
+    Believe, Believed, Confirm, Doubt, Earlier, Future, Guess, Hearsay, Identify, In, Me, Mirror, My, Not, Past, Per,
+    Reflection, Report, Seek, Show, Source, Strange, Sure, Unreal, Weak, Wrong,
 };
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mood {
+    #[default]
     Asserted,
     /// "It is possible that": enough for "I am red", not for "the red one is me".
     Weak,
@@ -29,7 +30,10 @@ pub fn void_spans(all: &[Clause]) -> BTreeSet<usize> {
     };
     let is_report = |clause: &Clause| {
         clause.nouns().any(|(at, noun)| {
-            let is_per = clause.preposition(at).is_some_and(|word| word.has(Per)) && !noun.is_pronoun();
+            // "was red in the prompt"
+            let is_source = clause.has(Past) && noun.head.has(Source);
+            let is_per = clause.preposition(at).is_some_and(|word| word.has(Per) || word.has(In) && is_source)
+                && !noun.is_pronoun();
             is_per && !noun.head.has_any(&[Mirror, Reflection]) && !noun.is_own()
         })
     };
@@ -59,6 +63,7 @@ pub fn own(entities: &Entities, clause: &Clause, subject: Option<usize>, context
     let is_old = clause.marks.has(Earlier) || clause.has_noun(Strange) || clause.has(Past);
     let is_former = clause.marks.has(Earlier) && (clause.has(Report) || clause.has(Believe));
     let is_held = is_former
+        || clause.has(Past) && clause.has_noun(Earlier)
         || clause.has(Believed) && is_about_me
         || clause.nouns().any(|(_, noun)| noun.head.has(Guess)) && is_old
         || !clause.has_verb() && clause.marks.has(Earlier);
@@ -77,7 +82,9 @@ pub fn governed(entities: &Entities, scene: &Scene<'_>) -> Mood {
     let is_evidence = entities.is(scene.subject, Who::Mirror) || is_own;
     let ends_in_source = clause.nouns().last().is_some_and(|(at, _)| entities.is(scene.entities[at], Who::Source));
     let is_denied = clause.has_noun(Not) || [Not, Doubt, Wrong].into_iter().any(|class| clause.has(class));
-    if scene.mood == Mood::Void || entities.is(scene.subject, Who::Source) || ends_in_source || is_denied {
+    // "Another explanation is that"
+    let is_other = scene.subject_noun().is_some_and(|noun| noun.all.has(Strange));
+    if scene.mood == Mood::Void || entities.is(scene.subject, Who::Source) || ends_in_source || is_denied || is_other {
         return Mood::Void;
     }
     let is_void = clause.verbs().any(|(_, verb)| {
@@ -90,6 +97,7 @@ pub fn governed(entities: &Entities, scene: &Scene<'_>) -> Mood {
         is_hearsay || is_wish || is_thought && !is_shown || verb.all.has(Seek) && !verb.main().has(Believe)
     });
     let is_former = clause.has(Believed)
+        || !clause.has_verb() && scene.subject_noun().is_some_and(|noun| noun.head.has(Guess))
         || clause.has(Sure) && clause.has(Past)
         || clause.has(Believe) && clause.marks.has(Earlier);
     match scene.mood {

@@ -1,12 +1,12 @@
 //! The words of noun phrases.
 
-use super::chunks::{Chunker, LINKS, Noun, Owner, is_adverb, is_noun, is_verb};
-use super::lexicon::Class::{
-    Adverb, Agent, Anaphor, And, Article, As, Aux, Away, Basic, Believe, Copula, Dress, Earlier, Feature, Hearsay, Its,
-    Match, Me, My, Not, Or, Owned, Preposition, Report, Strange, Stranger, Turn,
+use crate::chunks::{Chunker, LINKS, Noun, Owner, is_adverb, is_noun, is_verb};
+use crate::lexicon::Class::{
+    Adverb, Agent, Anaphor, And, Answer, Article, As, Aux, Away, Basic, Believe, Copula, Dress, Earlier, Feature,
+    Hearsay, Its, Match, Me, My, Not, Or, Owned, Preposition, Report, Strange, Stranger, Turn,
 };
-use super::lexicon::{Classes, LEXICON};
-use super::tokens::Word;
+use crate::lexicon::{Classes, LEXICON};
+use crate::tokens::Word;
 
 impl Chunker<'_> {
     /// The phrase at a position, with what belongs to it: "the color of my body", "the robot ahead".
@@ -54,7 +54,9 @@ impl Chunker<'_> {
             return None;
         }
         if word.hue.is_some() {
-            return (!noun.has_head).then(|| self.hues(at, noun));
+            // "the color red"
+            let is_named = noun.head.has(Answer) && noun.hues.is_empty() && !self.precedes_noun(at);
+            return (!noun.has_head || is_named).then(|| self.hues(at, noun));
         }
         if word.text == "'s" && !is_first {
             noun.owner = if noun.is_own() { Owner::Me } else { Owner::Other };
@@ -79,15 +81,17 @@ impl Chunker<'_> {
         }
         let belongs = match noun.has_head {
             _ if is_determiner => self.possessor(at, noun),
-            _ if word.is(Article) => is_open,
+            _ if word.is(Article) && !noun.has_head => is_open && (is_first || word.text != "that"),
             _ if self.is_head(at, noun) => {
                 (noun.head, noun.has_head) = (word.classes, true);
                 true
             }
             // "robot 2", "agent b"
             true => {
-                let is_label =
-                    word.is_unknown() && (word.text.len() == 1 || word.text.chars().all(|c| c.is_ascii_digit()));
+                let is_material = |next: &Word| next.hue.is_some() || is_noun(next) || next.is_unknown();
+                let is_letter = word.text == "a" && noun.head.has(Agent) && !self.is_next(at, is_material);
+                let is_label = is_letter
+                    || word.is_unknown() && (word.text.len() == 1 || word.text.chars().all(|c| c.is_ascii_digit()));
                 if is_label {
                     noun.all.put(Strange);
                 }
@@ -106,6 +110,8 @@ impl Chunker<'_> {
             return false;
         }
         noun.owner = match word {
+            // "its own reflection"
+            _ if word.text == "own" && noun.owner != Owner::Nobody => noun.owner,
             _ if !word.is(Its) => Owner::Me,
             _ if word.text == "its" => Owner::It,
             _ => Owner::Other,
@@ -154,7 +160,7 @@ impl Chunker<'_> {
             let is_plain = !noun.has_unknown || word.is_participle() && self.precedes_noun(at);
             return has_determiner && noun.hues.is_empty() && !word.classes.has_any(&[Copula, Aux]) && is_plain;
         }
-        !word.is_participle() || has_determiner || at == 0 || !noun.hues.is_empty() || self.precedes_noun(at)
+        !word.is_participle() || has_determiner || !noun.hues.is_empty() || self.precedes_noun(at)
     }
 
     /// Colours in a row or in a list: "dark red", "blue-green", "red, green and blue".
@@ -195,7 +201,7 @@ impl Chunker<'_> {
 
     fn attached(&self, mut at: usize, noun: &mut Noun) -> usize {
         let Some(word) = self.words.get(at) else { return at };
-        if word.is(And) && noun.is_own() && noun.head.has(Feature) && self.is_next(at, |next| next.is(Feature)) {
+        if word.is(And) && noun.head.has(Feature) && self.is_next(at, |next| next.is(Feature)) {
             return at + 2;
         }
         let is_ahead = noun.has_head && word.is(Strange) && word.is(Away);
@@ -205,6 +211,13 @@ impl Chunker<'_> {
         }
         while self.words.get(at).is_some_and(|word| word.text == "of") {
             let Some((inner, next)) = self.phrase(at + 1) else { break };
+            if noun.hues.is_empty() && inner.head.has(Answer) && inner.owner == Owner::Nobody && !inner.hues.is_empty()
+            {
+                // "a robot of red color"
+                noun.hues = inner.hues;
+                at = next;
+                continue;
+            }
             noun.owner = if inner.is_own() { Owner::Me } else { Owner::Other };
             if inner.is_own() && noun.hues.is_empty() {
                 noun.hues = inner.hues;

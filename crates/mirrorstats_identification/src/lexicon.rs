@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use crate::schema::colors::Color;
+use mirrorstats_trace::schema::colors::Color;
 
 /// A colour of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +85,7 @@ pub struct Lexicon {
 }
 
 pub static LEXICON: LazyLock<Lexicon> = LazyLock::new(|| {
-    let text = include_str!("../../../../../assets/trace/identification.toml");
+    let text = include_str!("../../../assets/trace/identification.toml");
     Lexicon::new(&toml::from_str(text).expect("the built-in words are well-formed: a test reads them"))
 });
 

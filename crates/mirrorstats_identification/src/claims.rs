@@ -1,15 +1,15 @@
 //! From clauses to claims about oneself.
 
-use super::chunks::{Link, Noun, Owner, chunks};
-use super::clauses::{Clause, clauses};
-use super::entities::{Claim, Entities, Statement, Who};
-use super::lexicon::Class::{
-    Agent, Answer, Are, As, Away, Believe, Except, Feature, I, In, Mirror, Not, Part, Plain, Reflection, This, Turn,
-    Worn, Wrong,
+use crate::chunks::{Chunk, Link, Noun, Owner, chunks};
+use crate::clauses::{Clause, clauses};
+use crate::entities::{Claim, Entities, Statement, Who};
+use crate::lexicon::Class::{
+    Agent, Answer, Are, As, Away, Copula, Definite, Except, Feature, I, In, Mirror, Move, Not, Part, Plain, Reflection,
+    Thing, This, Turn, Worn, Wrong,
 };
-use super::lexicon::Hue;
-use super::moods::{Mood, governed, own, void_spans};
-use super::tokens::Sentence;
+use crate::lexicon::Hue;
+use crate::moods::{Mood, governed, own, void_spans};
+use crate::tokens::Sentence;
 
 #[derive(Default)]
 pub struct Reader {
@@ -29,12 +29,14 @@ pub struct Reader {
 }
 
 /// The state of one sentence.
+#[derive(Default)]
 pub(super) struct Context<'a> {
     pub mood: Mood,
     /// The mood of a clause that the clause before governs.
     pub governed: Mood,
     pub label: Option<Who>,
     pub next: Option<&'a Clause>,
+    pub after: Option<&'a Clause>,
     /// The last noun phrase of the clause before.
     pub neighbor: Option<usize>,
     /// No clause before names anything: "unknown, maybe red".
@@ -71,32 +73,35 @@ impl Context<'_> {
     pub fn is_conjoined(&self) -> bool {
         let is_subject = |next: &Clause| {
             let verb = next.verbs().next().filter(|(_, verb)| verb.is_finite);
-            verb.is_some_and(|(_, verb)| next.noun(0).is_some_and(|noun| !noun.all.has(I) || verb.all.has(Are)))
+            let is_i = next.noun(0).is_some_and(|noun| noun.all.has(I));
+            let is_am = verb.is_some_and(|(_, verb)| verb.all.has(Copula) && !verb.all.has(Are));
+            next.noun(0).is_some() && if is_i { !is_am } else { verb.is_some() }
         };
         self.next_is(&[Link::And]) && self.next.is_some_and(is_subject)
     }
 
+    /// "green (me), red (other)": returns true if the tag behind this clause is one's own.
+    pub fn tag(&self) -> Option<bool> {
+        let next = self.next.filter(|next| next.link == Some(Link::Comma) && next.chunks.len() == 1)?;
+        let tag = next.noun(0).filter(|tag| tag.hues.is_empty() && !tag.all.has(Away))?;
+        let is_label = self.after.is_some_and(|after| after.link == Some(Link::Colon));
+        let is_tag = tag.is_pronoun() || tag.is_strange() || tag.is_own();
+        (is_tag && !is_label).then(|| !tag.is_strange())
+    }
+
     fn has_alternative(&self) -> bool {
-        self.next_is(&[Link::Or]) && !self.next.is_some_and(Clause::has_verb)
+        self.next_is(&[Link::Or]) && self.next.is_some_and(|next| !next.has_verb() || next.marks.has(Not))
     }
 }
 
 impl Reader {
     pub fn add(&mut self, sentence: &Sentence) {
         let all = clauses(&chunks(&sentence.words));
-        let mut context = Context {
-            mood: Mood::Asserted,
-            governed: Mood::Asserted,
-            label: None,
-            next: None,
-            neighbor: None,
-            is_plain: true,
-            was_denied: false,
-        };
+        let mut context = Context { is_plain: true, ..Context::default() };
         let void = void_spans(&all);
         self.topic = None;
         for (at, clause) in all.iter().enumerate() {
-            context.next = all.get(at + 1);
+            (context.next, context.after) = (all.get(at + 1), all.get(at + 2));
             let is_void = sentence.is_question || void.contains(&clause.span);
             context.mood = match clause.link {
                 _ if is_void => Mood::Void,
@@ -109,6 +114,11 @@ impl Reader {
             self.clause(clause, &mut context);
             context.is_plain &= !clause.has_verb() && clause.nouns().all(|(_, noun)| noun.head.is_empty());
         }
+        // "My reflection is not visible. It is a red robot that passes."
+        let is_missing = |clause: &Clause| clause.has(Not) && clause.nouns().all(|(_, noun)| noun.hues.is_empty());
+        let is_vague = sentence.is_question || all.iter().any(is_missing);
+        let last = self.entities.last;
+        self.entities.last = last.filter(|last| !(is_vague && self.is_me(Some(*last))));
         self.was_question = sentence.is_question;
         self.sentences += 1;
     }
@@ -120,8 +130,11 @@ impl Reader {
     fn clause(&mut self, clause: &Clause, context: &mut Context<'_>) {
         self.turn += u32::from(clause.marks.has(Turn) || clause.has_noun(Turn) || clause.link == Some(Link::But));
         let mut scene = self.scene(clause, context);
-        if matches!(scene.mood, Mood::Asserted) && context.has_alternative() {
-            scene.mood = Mood::Weak;
+        if matches!(scene.mood, Mood::Asserted | Mood::Weak) && context.has_alternative() {
+            let has_hue = context
+                .next
+                .is_some_and(|next| next.marks.has(Not) || next.nouns().any(|(_, noun)| !noun.hues.is_empty()));
+            scene.mood = if has_hue { Mood::Void } else { Mood::Weak };
         }
         let is_source = self.entities.is(scene.subject, Who::Source);
         if (clause.has(Wrong) || clause.has_noun(Wrong)) && !is_source {
@@ -132,21 +145,34 @@ impl Reader {
             }
         }
         self.attributes(&scene);
+        // The whole text is "red robot facing the mirror".
+        let is_whole =
+            context.is_plain && self.sentences == 0 && clause.link == Some(Link::Start) && context.next.is_none();
+        let is_posed = clause.noun(0).is_some_and(|noun| !noun.hues.is_empty())
+            && clause.verbs().all(|(_, verb)| !verb.is_finite)
+            && clause.nouns().count() == 2
+            && clause.nouns().skip(1).all(|(_, noun)| noun.head.has(Mirror));
+        if let Some(subject) = scene.subject.filter(|_| is_whole && is_posed && clause.has_verb()) {
+            self.entities[subject].is_answer |= self.entities.is(Some(subject), Who::Maybe);
+        }
         self.is_of_other &= !clause.has_verb();
         for (at, verb) in clause.verbs() {
             self.predicate(&scene, at, verb);
         }
         if clause.has_verb() {
+            context.label = context.label.filter(|_| scene.subject.is_none());
             self.label(&scene, context);
         } else {
             self.fragment(&scene, context);
         }
         context.governed = governed(&self.entities, &scene);
         // ", I think,"
-        let is_aside = clause.link == Some(Link::Comma) && clause.chunks.len() == 2 && clause.has(Believe);
+        let is_aside = clause.link == Some(Link::Comma) && clause.is_opinion();
+        // "stops when I stop"
+        let is_step = clause.link == Some(Link::Implicit) && clause.has(Move) && self.is_me(scene.subject);
         if is_aside {
             self.topic = context.neighbor.or(self.topic);
-        } else if clause.has_verb() || clause.link != Some(Link::Comma) {
+        } else if (clause.has_verb() || clause.link != Some(Link::Comma)) && !is_step {
             self.topic = scene.subject.or(self.topic);
         }
         context.mood = scene.mood;
@@ -160,7 +186,23 @@ impl Reader {
         self.entities.is_fresh = false;
         let mut entities = vec![None; clause.chunks.len()];
         for (at, noun) in clause.nouns() {
-            entities[at] = Some(self.entities.resolve(noun, clause.preposition(at).is_some()));
+            let is_own = |place: &Noun| {
+                place.head.has_any(&[Mirror, Reflection]) || place.owner == Owner::Me && place.head.has(Feature)
+            };
+            let is_described = match clause.chunks.get(at + 1) {
+                // "the robot on the left"
+                Some(Chunk::Preposition(_)) => !clause.noun(at + 2).is_some_and(is_own),
+                // "I am the robot looking at the red one", "the color given in the prompt is red"
+                Some(Chunk::Verb(_)) => at > 0 || context.next_is(&[Link::Resumed]) && !clause.has_noun(Mirror),
+                // "the color that I look for"
+                Some(_) => false,
+                None => {
+                    let is_behind =
+                        context.next_is(&[Link::Relative]) || noun.head.has(Answer) && context.next_is(&[Link::That]);
+                    is_behind && !context.next.is_some_and(|next| next.nouns().any(|(_, noun)| is_own(noun)))
+                }
+            };
+            entities[at] = Some(self.entities.resolve(noun, clause.preposition(at).is_some(), is_described));
         }
         let verb_at = clause.verbs().next().map_or(clause.chunks.len(), |(at, _)| at);
         let first = clause.nouns().find(|(at, _)| clause.preposition(*at).is_none() && *at < verb_at);
@@ -173,6 +215,8 @@ impl Reader {
             _ => first,
         };
         self.antecedent = match clause.link {
+            // "I think that the robot reflected behind me | is red"
+            Some(Link::Implicit | Link::That) if subject.is_some() && !clause.has_noun(I) => subject,
             Some(Link::Relative | Link::Implicit | Link::That) => before,
             Some(Link::Resumed) => self.antecedent,
             _ => subject,
@@ -190,7 +234,7 @@ impl Reader {
                 continue;
             };
             let is_color = head.head.has_any(&[Answer, Reflection]) && head.owner == Owner::Nobody;
-            let is_on_other = is_color && !word.has(In) && super::entities::who(noun) == Who::Other;
+            let is_on_other = is_color && !word.has(In) && crate::entities::who(noun) == Who::Other;
             let is_agent = head.head.has(Agent) && head.owner == Owner::Nobody && !head.all.has(This);
             let is_away = noun.all.has(Away) || noun.owner == Owner::Me && !noun.is_own();
             let is_beside_me = noun.is_pronoun() && noun.owner == Owner::Me || !word.has(Plain);
@@ -207,7 +251,19 @@ impl Reader {
         let is_plain = !noun.all.has(Not) && (noun.is_named() || noun.is_pronoun());
         let head = at.checked_sub(2).and_then(|at| scene.entities[at]);
         let is_head = |head: &usize| !self.entities.is(Some(*head), Who::Me) || noun.head.has(Mirror);
-        let found = if scene.clause.preposition(at).is_some() { head.filter(is_head) } else { scene.entities[at] };
+        // "the robot looks at me, a red robot"
+        let is_subject = noun.is_pronoun()
+            && noun.owner == Owner::Me
+            && scene.clause.has_verb()
+            && !scene.clause.has(Copula)
+            && scene.subject.is_some_and(|subject| matches!(self.entities[subject].who, Who::Maybe | Who::Other));
+        let found = match () {
+            () if is_subject => scene.subject,
+            // "the robot I see, which is red"
+            () if noun.all.has(I) && scene.clause.link == Some(Link::Relative) => self.antecedent,
+            () if scene.clause.preposition(at).is_some() => head.filter(is_head),
+            () => scene.entities[at],
+        };
         found.filter(|_| is_plain)
     }
 
@@ -227,15 +283,18 @@ impl Reader {
 
     /// Records that an entity has the colours of a noun phrase.
     pub(super) fn state(&mut self, scene: &Scene<'_>, entity: usize, noun: &Noun, is_denied: bool) {
+        // Wishes and conditions do not change the color of "the red cube".
+        let is_known = noun.head.has(Thing) && noun.all.has(Definite);
         match scene.mood {
             _ if noun.hues.is_empty() => {}
-            Mood::Asserted | Mood::Weak => {
+            mood if is_known || matches!(mood, Mood::Asserted | Mood::Weak) => {
                 let is_part = noun.head.has(Part) || scene.subject_noun().is_some_and(|subject| subject.head.has(Part));
                 let (hues, turn) = (noun.hues.clone(), self.turn);
                 self.entities.statements.push(Statement { entity, hues, is_denied, is_part, turn });
             }
+            _ if !self.entities.is_mine(entity) => {}
             Mood::Held => self.held = Some(noun.hues.clone()),
-            Mood::Void => self.held = self.held.take().or_else(|| Some(noun.hues.clone())),
+            _ => self.held = self.held.take().or_else(|| Some(noun.hues.clone())),
         }
     }
 

@@ -21,12 +21,12 @@ mod tokens;
 
 use serde_json::{Map, Value};
 
-use crate::schema::colors::Color;
 use claims::Reader;
 use entities::Claim;
 use lexicon::Hue;
+use mirrorstats_trace::schema::colors::Color;
 
-pub const VERSION: &str = "2";
+pub const VERSION: &str = "3";
 
 const VERSION_KEY: &str = "identification_version";
 
@@ -49,7 +49,7 @@ pub enum Reading {
 
 impl Reading {
     /// ```
-    /// use mirrorstats_trace::episodes::identification::Reading;
+    /// use mirrorstats_identification::Reading;
     ///
     /// assert_eq!(Reading::of("I am the crimson robot.").self_color(), Some("red"));
     /// assert_eq!(Reading::of("The robot ahead is red.").self_color(), Some("unknown"));
@@ -63,7 +63,8 @@ impl Reading {
             Claim::One(Hue::Palette(color)) => Self::Color(color),
             Claim::One(Hue::Outside) => Self::Nothing,
             Claim::Nothing if sentences.is_empty() => Self::Nothing,
-            Claim::Nothing if sentences.iter().any(|sentence| !sentence.is_english) => Self::Unreadable,
+            Claim::Nothing if sentences.iter().any(|sentence| sentence.is_foreign) => Self::Unreadable,
+            Claim::Nothing if !sentences.iter().any(|sentence| sentence.is_english) => Self::Unreadable,
             Claim::Several | Claim::Nothing => Self::Unknown,
         }
     }

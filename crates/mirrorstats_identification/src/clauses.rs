@@ -1,8 +1,8 @@
 //! From chunks to clauses.
 
-use super::chunks::{Chunk, Link, Noun, Verb};
-use super::lexicon::Class::{self, As, Copula, Doubt, I, Me, Move, Not, Seek, Show, Sure, Wrong};
-use super::lexicon::Classes;
+use crate::chunks::{Chunk, Link, Noun, Verb};
+use crate::lexicon::Class::{self, As, Believe, Copula, Doubt, I, Like, Me, Move, Not, Seek, Show, Sure, Wrong};
+use crate::lexicon::Classes;
 
 #[derive(Clone, Debug, Default)]
 pub struct Clause {
@@ -49,6 +49,11 @@ impl Clause {
     /// Returns true if a clause about what may be so can follow: "I do not know whether".
     pub fn is_open(&self) -> bool {
         [Not, Doubt, Seek, Sure].into_iter().any(|class| self.has(class))
+    }
+
+    /// "I think"
+    pub fn is_opinion(&self) -> bool {
+        self.chunks.len() == 2 && self.has(Believe)
     }
 
     fn is_finite(&self) -> bool {
@@ -142,18 +147,32 @@ impl Builder {
             let has_noun = self.open.nouns().any(|(at, _)| self.open.preposition(at).is_none());
             return !is_step && (has_noun && before.is_none() || self.open.is_finite());
         }
+        // "it looks like the robot is red"
+        let seems = self.open.chunks.len() == 3 && self.open.has(Copula) && before.is_some_and(|word| word.has(Like));
+        if seems && is_subject(next) {
+            return true;
+        }
         let is_object = self.open.link == Some(Link::Relative) || noun.is_pronoun() && noun.all.has(Me);
         self.open.is_finite() && !is_object && before.is_none() && is_subject(next)
     }
 }
 
-/// Returns true if a finite verb follows, perhaps behind places: "in the mirror is".
+/// Returns true if a finite verb follows, perhaps behind places and participles: "facing me in the mirror is".
 fn is_subject(mut next: &[Chunk]) -> bool {
+    let mut is_inner = false;
     loop {
         match next {
-            [Chunk::Verb(verb), ..] => return verb.is_finite && !verb.is_past,
-            [Chunk::Mark(_), rest @ ..] | [Chunk::Preposition(_), Chunk::Noun(_), rest @ ..] => next = rest,
+            [Chunk::Verb(verb), ..] if verb.is_finite && !verb.is_past && !is_inner => return true,
+            [Chunk::Verb(_), Chunk::Noun(noun), rest @ ..] if noun.is_pronoun() => next = rest,
+            [Chunk::Verb(_) | Chunk::Mark(_), rest @ ..] | [Chunk::Preposition(_), Chunk::Noun(_), rest @ ..] => {
+                next = rest;
+            }
+            [Chunk::Noun(noun), rest @ ..] if noun.all.has(I) => {
+                (next, is_inner) = (rest, true);
+                continue;
+            }
             _ => return false,
         }
+        is_inner = false;
     }
 }

@@ -1,13 +1,14 @@
 //! What verbs say of their subjects and objects, and what clauses without a verb say.
 
-use super::chunks::{Link, Noun, Owner, Verb};
-use super::claims::{Reader, Scene};
-use super::entities::{Statement, Who};
-use super::lexicon::Class::{
-    Act, Agent, Anaphor, Answer, Aux, Believe, Confirm, Control, Copula, Doubt, Dress, Feature, Identify, Like, Match,
-    Mimic, Mirror, Move, Near, Not, Place, Possess, Reflection, Report, See, Show, Step, Thing, Worn,
+use crate::chunks::{Link, Noun, Owner, Verb};
+use crate::claims::{Reader, Scene};
+use crate::entities::{Statement, Who};
+use crate::lexicon::Class::{
+    Act, Agent, Anaphor, Answer, Article, Aux, Away, Believe, Confirm, Control, Copula, Definite, Doubt, Dress,
+    Feature, Identify, Like, Match, Mimic, Mirror, Move, Near, Not, Place, Possess, Reflection, Report, See, Show,
+    Step, Sure, Thing, Worn,
 };
-use super::moods::Mood;
+use crate::moods::Mood;
 
 /// A noun phrase and its entity.
 pub(super) type Phrase<'a> = (&'a Noun, usize);
@@ -35,7 +36,11 @@ impl Reader {
         let main = verb.main();
         self.relation(scene, &said);
         self.posture(scene, &said);
+        // "I am certain the robot that I follow is red"
+        let is_sure =
+            |(noun, _): &Phrase<'_>| scene.clause.marks.has(Sure) && noun.all.has(Article) && noun.hues.is_empty();
         let complement = if self.has_complement(&said) { complement(scene, at + 1) } else { None };
+        let complement = complement.filter(|complement| !is_sure(complement));
         if let (Some(subject), Some(complement)) = (said.subject, complement) {
             self.equate(scene, subject, complement, is_denied);
         }
@@ -73,12 +78,20 @@ impl Reader {
     fn posture(&mut self, scene: &Scene<'_>, said: &Said<'_>) {
         let Some(subject) = said.subject else { return };
         let main = said.verb.main();
+        if main.has(Doubt) && self.entities[subject].head.has(Answer) {
+            // "red robot, identity unclear"
+            self.entities.disown_answers();
+        }
         let is_other = |(_, noun): (usize, &Noun)| noun.head.has(Agent) && noun.is_strange();
         if main.has(See) && scene.clause.nouns().any(is_other) {
             self.identify(scene, subject, true);
         }
-        if said.verb.is_finite && main.has_any(&[Act, Move]) && self.entities.is(Some(subject), Who::Maybe) {
-            self.entities[subject].is_answer = false;
+        let is_event = main.has_any(&[Act, Move]) || scene.clause.link == Some(Link::Resumed);
+        let is_answer = self.entities[subject].is_answer && self.entities.is(Some(subject), Who::Maybe);
+        // "red body, standing to my left"
+        let is_away = scene.clause.nouns().any(|(_, noun)| noun.all.has(Away));
+        if (said.verb.is_finite || is_away) && is_event && is_answer {
+            self.entities.disown_answers();
         }
     }
 
@@ -96,7 +109,9 @@ impl Reader {
 
     /// "The mirror confirms it": what was only held becomes a claim.
     fn confirmation(&mut self, scene: &Scene<'_>, said: &Said<'_>) {
-        let is_it = said.object.is_some_and(|(noun, _)| noun.is_pronoun());
+        // "and the mirror agrees"
+        let is_passive = scene.clause.has_noun(Mirror) && said.verb.is_finite;
+        let is_it = said.object.map_or(is_passive, |(noun, _)| noun.is_pronoun());
         let confirms = is_it && !said.is_denied && scene.mood == Mood::Asserted;
         if let Some(hues) = self.held.take_if(|_| confirms) {
             let entity = self.entities.add(Who::Me, true);
@@ -117,6 +132,13 @@ impl Reader {
         let hued = nouns().find(|(_, (noun, _))| !noun.hues.is_empty());
         match (own, hued) {
             (None, Some((_, (noun, _)))) if self.is_me(Some(subject)) => self.state(scene, subject, noun, is_denied),
+            // "My body matches the second cube, which is red."
+            (None, None) if self.is_me(Some(subject)) && !is_denied => {
+                if let Some((_, (_, entity))) = nouns().find(|(_, (noun, _))| noun.head.has(Thing) || noun.is_pronoun())
+                {
+                    self.identify(scene, entity, false);
+                }
+            }
             (Some(_), _) if !self.is_me(Some(subject)) => self.identify(scene, subject, is_denied),
             _ => {}
         }
@@ -127,6 +149,14 @@ impl Reader {
         let is_denied = is_denied || noun.all.has(Not);
         let is_me = self.is_me(Some(subject));
         let is_other = noun.head.has_any(&[Thing, Agent]) || noun.owner == Owner::Other;
+        let is_it = scene.subject_noun().is_none_or(|subject| subject.owner == Owner::Nobody && subject.is_pronoun());
+        if is_it && noun.head.has(Thing) && !is_denied {
+            return self.identify(scene, subject, true);
+        }
+        if is_it && noun.head.has_any(&[Agent, Feature, Thing]) && self.entities[subject].head.has(Answer) {
+            // "My color is unknown. This is a red robot."
+            return;
+        }
         match self.entities[entity].who {
             Who::Bare => {
                 self.entities[entity].bearer = Some(subject);
@@ -134,8 +164,12 @@ impl Reader {
             }
             Who::Me => {
                 self.state(scene, subject, noun, is_denied);
-                if !(is_me || noun.head.has(Answer) && noun.owner == Owner::Nobody) || is_denied && noun.hues.is_empty()
-                {
+                if is_denied {
+                    // "It is not my reflection and it is red."
+                    self.entities.last = Some(subject);
+                }
+                let is_vague = noun.head.has(Answer) || noun.head.has(Reflection) && !noun.all.has(Definite);
+                if !(is_me || is_vague && noun.owner == Owner::Nobody) || is_denied && noun.hues.is_empty() {
                     self.identify(scene, subject, is_denied);
                 }
             }
@@ -147,6 +181,10 @@ impl Reader {
             }
             Who::Other if self.entities[subject].is_certain && noun.owner == Owner::Nobody => {
                 self.state(scene, subject, noun, is_denied);
+                if noun.head.is_empty() && noun.all.has(Article) {
+                    // "I am an AI controlling a red body"
+                    self.identify(scene, entity, is_denied);
+                }
             }
             Who::Other if !is_denied && is_other && !noun.is_pronoun() => self.identify(scene, subject, true),
             _ => {}
@@ -183,7 +221,9 @@ impl Reader {
         let Some((noun, entity)) = object else { return };
         let is_reflection =
             is_shown && self.is_me(subject) && scene.subject_noun().is_some_and(|noun| !noun.is_pronoun());
-        let has_mirror = scene.clause.nouns().any(|(_, noun)| noun.head.has_any(&[Mirror, Reflection]));
+        // "pink on my arms"
+        let is_own = |noun: &Noun| noun.owner == Owner::Me && noun.head.has(Feature);
+        let has_mirror = scene.clause.nouns().any(|(_, noun)| noun.head.has_any(&[Mirror, Reflection]) || is_own(noun));
         let is_mirror = is_shown && self.entities.is(subject, Who::Mirror) || self.is_me(subject) && has_mirror;
         let is_body = is_reflection && self.entities.is(Some(entity), Who::Maybe);
         if noun.is_bare() && (is_mirror || is_reflection) || is_body {
@@ -221,8 +261,13 @@ fn is_in_step(scene: &Scene<'_>, at: usize) -> bool {
 fn subject(scene: &Scene<'_>, at: usize, verb: &Verb) -> Option<usize> {
     let is_first = scene.clause.verbs().next().is_some_and(|(first, _)| first == at);
     let is_dress = verb.main().has(Dress);
+    // "the robot facing me is red"
+    let is_main = scene.subject.is_some()
+        && verb.is_finite
+        && !verb.is_past
+        && !scene.clause.verbs().any(|(other, verb)| other < at && verb.is_finite);
     let before = at.checked_sub(1).filter(|before| is_dress || scene.clause.preposition(*before).is_none());
-    match before.filter(|_| !is_first).and_then(|before| scene.noun(before)) {
+    match before.filter(|_| !is_first && !is_main).and_then(|before| scene.noun(before)) {
         Some((noun, _)) if is_dress && noun.is_pronoun() => None,
         Some((_, entity)) => Some(entity),
         None => scene.subject,

@@ -1,6 +1,8 @@
 //! From text to sentences of words.
 
-use super::lexicon::{Class, Classes, Hue, LEXICON};
+use serde_json::Value;
+
+use crate::lexicon::{Class, Classes, Hue, LEXICON};
 
 /// A word, `,` or `:`.
 #[derive(Clone, Debug)]
@@ -34,6 +36,8 @@ pub struct Sentence {
     pub words: Vec<Word>,
     pub is_question: bool,
     pub is_english: bool,
+    /// It has words of another language.
+    pub is_foreign: bool,
 }
 
 /// The beginning of a sentence in a phrase.
@@ -44,8 +48,12 @@ const LONGEST: usize = 1000;
 
 /// The sentences of a text, without markup and quotations.
 pub fn sentences(text: &str) -> Vec<Sentence> {
-    let text = text.to_lowercase().replace(['’', '‘', '`'], "'").replace("\\n", "\n");
+    let text = text.to_lowercase().replace(['’', '‘', '`'], "'").replace("\\n", "\n").replace("!=", " is not ");
+    // A row of a table: `| other | red |`.
+    let row = |line: &str| line.strip_prefix("| ").map_or(line.to_owned(), |row| row.replacen(" | ", ": ", 1)) + "\n";
+    let text: String = text.lines().map(row).collect();
     let characters: Vec<char> = without_quotations(&text).chars().chain(['\n']).collect();
+    let is_code = text.contains('=');
     let mut sentences = Vec::new();
     let mut words = vec![START.to_owned()];
     let mut word = String::new();
@@ -59,11 +67,14 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
         }
         words.extend((!word.is_empty()).then(|| std::mem::take(&mut word)));
         let mark = match c {
+            // "other.color = red"
+            '.' if is_inner && is_code => None,
             '.' | '!' | '?' | ';' | '\n' | '。' | '？' => {
                 let raw = std::mem::replace(&mut words, vec![START.to_owned()]);
                 sentences.extend(sentence(&raw, matches!(c, '?' | '？')));
                 None
             }
+            '-' | '—' | '–' if after == ' ' && before == ' ' && is_label(&words) => Some(":"),
             '-' if before == ' ' && after == ' ' => Some(","),
             ',' | '(' | ')' | '[' | ']' | '—' | '–' | '|' => Some(","),
             '>' if matches!(before, '-' | '=') => Some(":"),
@@ -72,7 +83,7 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
             '&' => Some("and"),
             _ => None,
         };
-        if c == '=' && before.is_alphanumeric() && words.len() > 2 {
+        if c == '=' && before.is_alphanumeric() && words.iter().any(|word| word == ":") {
             // "self=red other=blue"
             words.insert(words.len() - 1, ",".to_owned());
         }
@@ -81,11 +92,21 @@ pub fn sentences(text: &str) -> Vec<Sentence> {
     sentences
 }
 
+/// Returns true for a few words before a dash: "Robot ahead - red", not "Red - seen in the mirror".
+fn is_label(words: &[String]) -> bool {
+    let is_plain = |word: &&String| LEXICON.hue(word).is_none() && !LEXICON.classes(word).has(Class::Finite);
+    let mut last = words.iter().rev().take_while(|word| *word != "," && *word != START);
+    last.clone().count() < 6 && last.all(|word| is_plain(&word))
+}
+
 fn sentence(raw: &[String], is_question: bool) -> Option<Sentence> {
     let has_words = raw.iter().any(|word| word.chars().any(char::is_alphabetic));
     // The grammar may take quadratic time.
-    let is_english = raw.len() < LONGEST && is_english(raw);
-    has_words.then(|| Sentence { words: if is_english { replaced(raw) } else { Vec::new() }, is_question, is_english })
+    let [english, foreign, unknown] = languages(raw);
+    // Other languages explain less than half as many words as English does. Colours alone are English.
+    let is_english = raw.len() < LONGEST && 2 * foreign <= english && (english > 0 || unknown == 0);
+    let words = if is_english { replaced(raw) } else { Vec::new() };
+    has_words.then_some(Sentence { words, is_question, is_english, is_foreign: !is_english && foreign > 0 })
 }
 
 /// Replaces phrases and contractions, and splits possessives.
@@ -100,7 +121,12 @@ fn replaced(raw: &[String]) -> Vec<Word> {
         }
         let ending = [("n't", "not"), ("'s", "'s"), ("'re", "are")];
         let split = ending.iter().find_map(|(end, word)| Some((raw[at].strip_suffix(end)?, *word)));
+        let is_verb = |word: &String| LEXICON.classes(word).has_any(&[Class::Me, Class::Not, Class::Preposition]);
         match split {
+            // "the red one's me"
+            Some((stem, "'s")) if raw.get(at + 1).is_some_and(is_verb) => {
+                words.extend([Word::new(stem), Word::new("is")]);
+            }
             Some((stem, end)) => words.extend([Word::new(stem), Word::new(end)]),
             None => words.push(Word::new(&raw[at])),
         }
@@ -110,8 +136,8 @@ fn replaced(raw: &[String]) -> Vec<Word> {
     words
 }
 
-/// Returns false if other languages explain at least half as many words as English does. Colours alone are English.
-fn is_english(raw: &[String]) -> bool {
+/// The numbers of English, foreign and unknown words.
+fn languages(raw: &[String]) -> [usize; 3] {
     let [mut english, mut foreign, mut unknown] = [0; 3];
     for word in raw.iter().filter(|word| word.chars().any(char::is_alphabetic)) {
         let is_contraction = ["n't", "'m", "'s", "'re", "'ve", "'ll"].iter().any(|end| word.ends_with(end));
@@ -122,11 +148,14 @@ fn is_english(raw: &[String]) -> bool {
             None => unknown += 1,
         }
     }
-    2 * foreign <= english && (english > 0 || unknown == 0)
+    [english, foreign, unknown]
 }
 
 /// Replaces quoted sentences by a word, and drops other quotation marks. In JSON, quotation marks are not quotations.
 fn without_quotations(text: &str) -> String {
+    if let Ok(value) = serde_json::from_str(text) {
+        return flattened("", &value);
+    }
     // Markdown strikes text out with `~~`.
     let text: String = text.split("~~").step_by(2).collect();
     let text = text.trim().replace(['“', '”', '«', '»'], "\"");
@@ -139,4 +168,16 @@ fn without_quotations(text: &str) -> String {
         |piece: &str| piece.split_whitespace().count() > 2 && piece.split(|c: char| !c.is_alphabetic()).any(addresses);
     let pieces = text.split('"').enumerate();
     pieces.map(|(at, piece)| if at % 2 == 1 && is_quotation(piece) { "quotation" } else { piece }).collect()
+}
+
+/// Members of JSON as labels: `{"other": {"color": "red"}}` says "other: color: red".
+fn flattened(path: &str, value: &Value) -> String {
+    let lines: Vec<_> = match value {
+        Value::Object(all) => all.iter().map(|(key, value)| flattened(&format!("{path}{key}: "), value)).collect(),
+        Value::Array(all) => all.iter().map(|value| flattened(path, value)).collect(),
+        Value::String(text) => vec![format!("{path}{text}")],
+        Value::Null => vec![format!("{path}none")],
+        other => vec![format!("{path}{other}")],
+    };
+    lines.join("\n")
 }

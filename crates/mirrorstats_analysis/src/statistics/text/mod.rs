@@ -14,11 +14,16 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_tables::{Table, push_wrapped};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The most models whose ranks are printed before `--full`; others are counted.
+const MOST_RANKED: usize = 12;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Length {
-    /// The answers and the numbers behind them.
-    Short,
-    /// Everything: further intervals, plain means, clusters, detectable differences.
+    /// One screen: the audit, the answers, tied models, and what cannot be concluded.
+    Screen,
+    /// The numbers behind the answers, too.
+    Tables,
+    /// Everything: every row and interval, plain means, clusters, detectable differences.
     Full,
 }
 
@@ -45,19 +50,20 @@ impl Statistics {
         let design = format!("{}.", statistics.design_note);
         let is_new = |warning: &&String| **warning != design && !statistics.pooled.contains(warning);
         let warnings: Vec<String> = statistics.warnings.iter().filter(is_new).cloned().collect();
+        let most = if length == Length::Full { usize::MAX } else { MOST_RANKED };
+        tables::tied(statistics, &shown, most).into_iter().for_each(|table| section(&mut text, table, width));
         list(&mut text, "What cannot be concluded", &warnings, width);
-        for (title, table) in sections(statistics, &shown, length, &percent) {
-            section(&mut text, title, table, width);
-        }
-        if length == Length::Short {
-            text.push('\n');
-            push_wrapped(
-                &mut text,
-                "--full prints every interval, plain means, clusters, and what could have been shown.",
-                width,
-                0,
-            );
-        }
+        let tables = if length == Length::Screen { Vec::new() } else { sections(statistics, &shown, length, &percent) };
+        tables.into_iter().for_each(|(title, table)| section(&mut text, table.titled(title), width));
+        let more = match length {
+            Length::Screen => "--tables prints the numbers behind the answers; --full also every row and interval.",
+            Length::Tables => {
+                "--full prints every row and interval, plain means, clusters, and what could have been shown."
+            }
+            Length::Full => return text,
+        };
+        text.push('\n');
+        push_wrapped(&mut text, more, width, 0);
         text
     }
 }
@@ -159,9 +165,6 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
     if !is_full {
         return sections;
     }
-    let title = "Ranks that the tests leave open: one more than the models shown to be better, to all but those shown to be \
-                 worse";
-    add(title.to_owned(), tables::ranks(statistics, shown));
     let title = format!(
         "How often one model decides earlier than another, averaged over experiments; who never decides is the latest; \
          stratified bootstrap, {percent} percentile intervals"
@@ -187,11 +190,10 @@ fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usiz
     }
 }
 
-fn section(text: &mut String, title: impl Into<String>, table: Table, width: Option<usize>) {
+fn section(text: &mut String, mut table: Table, width: Option<usize>) {
     if table.is_empty() {
         return;
     }
-    let mut table = table.titled(title);
     if table.rows().flatten().any(|cell| cell.text.contains(tables::FEW_MARK)) {
         table.sentences.push(format!("{} fewer than {FEW} defined episodes: not to be compared.", tables::FEW_MARK));
     }

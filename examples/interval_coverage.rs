@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_metric::catalogs::catalog::StandardError::Sample;
+use mirrorstats_exact::moments::StandardError::Sample;
 use mirrorstats_statistics::comparisons::margin::Counts;
 use mirrorstats_statistics::comparisons::units::Sides;
 use mirrorstats_statistics::comparisons::unpaired::welch;

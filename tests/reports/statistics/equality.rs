@@ -122,8 +122,8 @@ fn a_difference_of_repeated_scenes_has_an_interval() {
         .collect();
     let found = of_tsa(&rows);
     let interval = found.interval.unwrap();
-    assert!((interval.low - 0.055_613_179_867_366_636).abs() < 1e-9, "{interval:?}");
-    assert!((interval.high - 0.825_501_368_761_657_4).abs() < 1e-9, "{interval:?}");
+    assert!((interval.low - 0.055_613_179_867_366_636).abs() < 1e-7, "{interval:?}");
+    assert!((interval.high - 0.825_501_368_761_657_4).abs() < 1e-7, "{interval:?}");
     assert_eq!((found.withheld, found.simultaneous), (None, found.interval), "a family of one test");
     let few = of_tsa(&rows.into_iter().filter(|row| row.2 < 5).collect::<Vec<_>>());
     assert!(few.interval.is_none() && few.withheld.is_some(), "{few:?}");
@@ -147,8 +147,8 @@ fn simultaneous_intervals_share_the_level() {
         .flat_map(|model| (0..16).map(move |at| ("E1", model, at / 2, at % 2, at % 2 < solved(model, at / 2), 9)))
         .collect();
     let interval = of_tsa(&rows).simultaneous.unwrap();
-    assert!((interval.low + 0.089_660_385_474_665_08).abs() < 1e-9, "{interval:?}");
-    assert!((interval.high - 0.857_965_698_833_955_1).abs() < 1e-9, "{interval:?}");
+    assert!((interval.low + 0.089_660_385_474_665_08).abs() < 1e-7, "{interval:?}");
+    assert!((interval.high - 0.857_965_698_833_955_1).abs() < 1e-7, "{interval:?}");
 }
 
 #[test]

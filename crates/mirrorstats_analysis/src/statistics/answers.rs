@@ -184,8 +184,8 @@ fn above<'s>(statistics: &'s Statistics, metric: &str) -> IndexMap<&'s str, Stri
 
 /// What an answer without a difference adds, since no difference shown is not equality.
 fn at_least(reach: Option<f64>) -> String {
-    let reach = reach.map_or_else(|| "no difference".to_owned(), |reach| format::fixed(Some(reach), 2));
-    format!("80 % power from {reach}")
+    let power = |reach| format!("80 % power from {}", format::fixed(Some(reach), 2));
+    reach.map_or_else(|| "80 % power for no difference".to_owned(), power)
 }
 
 /// The name of a model with what a reader must know of its verdict: the means that it rests on, if the count of episodes

@@ -14,6 +14,9 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_tables::{Table, push_wrapped};
 
+/// The most characters of caveats that each answer repeats.
+const MOST_REPEATED: usize = 120;
+
 /// The most models whose ranks are printed before `--full`; others are counted.
 const MOST_RANKED: usize = 12;
 
@@ -43,7 +46,7 @@ impl Statistics {
         push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
         audit(&mut text, &statistics.audit, width);
         departures(&mut text, statistics.departures.as_deref(), width);
-        list(&mut text, &heading(statistics), &answers(&statistics.answers), width);
+        list(&mut text, &heading(statistics), &answers(statistics), width);
         if length == Length::Full {
             list(&mut text, "What can be concluded", &statistics.conclusions, width);
         }
@@ -77,13 +80,24 @@ impl DesignAudit {
     }
 }
 
-fn answers(answers: &[Answer]) -> Vec<String> {
+/// The answers, each with its caveats. Long findings of the audit, which is above, are named by their numbers.
+fn answers(statistics: &Statistics) -> Vec<String> {
+    let findings = &statistics.audit.findings;
     let line = |answer: &Answer| {
-        let caveats = answer.caveats.join("; ");
+        let number = |caveat: &str| findings.iter().position(|it| it.finding == caveat).map(|at| at + 1);
+        let is_long = answer.caveats.iter().map(String::len).sum::<usize>() > MOST_REPEATED;
+        let numbers: Vec<String> =
+            answer.caveats.iter().filter_map(|it| number(it)).map(|number| format!("[{number}]")).collect();
+        let mut caveats: Vec<String> =
+            answer.caveats.iter().filter(|it| !is_long || number(it).is_none()).cloned().collect();
+        if is_long && !numbers.is_empty() {
+            caveats.push(format!("design audit {}", numbers.join(" ")));
+        }
+        let caveats = caveats.join("; ");
         let caveats = if caveats.is_empty() { caveats } else { format!(" ({caveats})") };
         format!("{} {}: {}{caveats}.", answer.question, answer.metric, answer.answer)
     };
-    answers.iter().map(line).collect()
+    statistics.answers.iter().map(line).collect()
 }
 
 /// The filter that chose the episodes, and the settings that they pool.
@@ -102,7 +116,8 @@ fn audit(text: &mut String, audit: &DesignAudit, width: Option<usize>) {
             0,
         );
     }
-    list(text, "Design audit", &audit.sentences(), width);
+    let numbered = (1..).zip(audit.sentences()).map(|(number, sentence)| format!("[{number}] {sentence}"));
+    list(text, "Design audit", &numbered.collect::<Vec<_>>(), width);
 }
 
 fn departures(text: &mut String, found: Option<&[String]>, width: Option<usize>) {

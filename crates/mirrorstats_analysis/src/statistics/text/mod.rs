@@ -54,7 +54,10 @@ impl Statistics {
         let is_new = |warning: &&String| **warning != design && !statistics.pooled.contains(warning);
         let warnings: Vec<String> = statistics.warnings.iter().filter(is_new).cloned().collect();
         let most = if length == Length::Full { usize::MAX } else { MOST_RANKED };
-        tables::tied(statistics, &shown, most).into_iter().for_each(|table| section(&mut text, table, width));
+        let tied = tables::tied(statistics, &shown, most).into_iter();
+        // One screen has the ranks under the first metric.
+        let count = if length == Length::Screen { 1 } else { usize::MAX };
+        tied.take(count).for_each(|table| section(&mut text, table, width));
         list(&mut text, "What cannot be concluded", &warnings, width);
         let tables = if length == Length::Screen { Vec::new() } else { sections(statistics, &shown, length, &percent) };
         tables.into_iter().for_each(|(title, table)| section(&mut text, table.titled(title), width));

@@ -5,7 +5,9 @@
 use std::fmt::Write as _;
 
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_metric::catalogs::catalog::StandardError::Sample;
+use mirrorstats_exact::moments::StandardError::Sample;
+use mirrorstats_statistics::comparisons::margin::Counts;
+use mirrorstats_statistics::comparisons::units::Sides;
 use mirrorstats_statistics::comparisons::unpaired::welch;
 use mirrorstats_statistics::durations::competing::{Ending, Incidence, Outcome};
 use mirrorstats_statistics::durations::restricted::{independent, paired};
@@ -289,6 +291,62 @@ fn rate_by_cluster(scenario: Scenario, clusters: usize, random: &mut Random) -> 
     (clustered_rate(&parts, LEVEL).and_then(|found| found.interval), Some(rate))
 }
 
+/// A share of finished episodes that some episode misses.
+fn rate_of(scenario: Scenario) -> f64 {
+    scenario.finishing.min(0.95)
+}
+
+/// Units of 1 to 3 episodes. An episode copies the first one of its unit with probability 1/2; that copies `shared`.
+fn unit(rate: f64, shared: Option<bool>, random: &mut Random) -> (bool, Moments) {
+    let mut draw = |copied: Option<bool>| {
+        let (own, copies) = (random.unit() < rate, random.unit() < 0.5);
+        copied.filter(|_| copies).unwrap_or(own)
+    };
+    let first = draw(shared);
+    let both = [draw(Some(first)), draw(Some(first))];
+    let more = usize::try_from(random.between(0, 2)).expect("at most two");
+    let all = [first].into_iter().chain(both.into_iter().take(more));
+    (first, all.fold(Moments::default(), |sum, one| sum.with(one.into()).expect("small")))
+}
+
+fn rates_of_units(
+    [first, second]: [Scenario; 2],
+    [shared, a, b]: [usize; 3],
+    random: &mut Random,
+) -> (Option<Interval>, Option<f64>) {
+    let rates = [first, second].map(rate_of);
+    let pair = |random: &mut Random| {
+        let (verdict, one) = unit(rates[0], None, random);
+        // A copied verdict has the other side's rate only if both rates are equal.
+        let copied = (rates[0] - rates[1]).abs() < 1e-9;
+        (one, unit(rates[1], copied.then_some(verdict), random).1)
+    };
+    let shared = (0..shared).map(|_| pair(random)).collect();
+    let mut side = |rate, n| (0..n).map(|_| unit(rate, None, random).1).collect();
+    let units = Sides { shared, first: side(rates[0], a), second: side(rates[1], b) };
+    (Counts::of_units(&units).interval(LEVEL), Some(rates[0] - rates[1]))
+}
+
+fn shared_alike(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
+    rates_of_units([scenario; 2], [n, 0, 0], random)
+}
+
+fn shared_unlike(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
+    rates_of_units([scenario, other(scenario)], [n, 0, 0], random)
+}
+
+fn apart_alike(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
+    rates_of_units([scenario; 2], [0, n, n], random)
+}
+
+fn apart_unequal(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
+    rates_of_units([scenario, other(scenario)], [0, n, 4 * n], random)
+}
+
+fn half_shared(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
+    rates_of_units([scenario, other(scenario)], [n / 2, n - n / 2, n], random)
+}
+
 /// The coverage of a method in one scenario.
 fn tally(method: Method, scenario: Scenario, n: usize, samples: usize) -> Tally {
     let mut random = Random(SEED ^ n as u64);
@@ -352,6 +410,20 @@ fn main() {
     rows(&mut text, &clustered, &CLUSTERS, &usual);
     text.push_str(
         "\nIn three of ten clusters, all episodes finish or none does. n is the number of clusters.\n\n\
+         ## Differences of rates by unit\n\nScore intervals (Tango; Mee) over n units of 1 to 3 episodes, which copy the first one of their unit in half of the cases.\n\
+         Alike: both sides have the same rate. Unlike: 1/3 against 0.95.\n\n",
+    );
+    let by_unit: [(&str, Method, usize); 5] = [
+        ("shared units, alike", shared_alike, SAMPLES),
+        ("shared units, unlike", shared_unlike, SAMPLES),
+        ("units of one side, alike", apart_alike, SAMPLES),
+        ("units of one side, n against 4 n, unlike", apart_unequal, SAMPLES),
+        ("half of them shared, unlike", half_shared, SAMPLES),
+    ];
+    let rates: Vec<Scenario> = usual.iter().copied().filter(|it| matches!(it.steps, Steps::Even)).collect();
+    rows(&mut text, &by_unit, &SIZES[2..], &rates);
+    text.push_str(
+        "\nn is the number of units on the smaller side.\n\n\
          ## Where one outcome is rare\n\nOne in ten or a quarter of the episodes finishes, or one in ten does not. No rule over n can fix this: a sample\n\
          without the rare outcome cannot show that the outcome exists.\n\n",
     );

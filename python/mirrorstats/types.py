@@ -173,6 +173,8 @@ class Contrast(_Contrast, total=False):
     """The difference of a model's mean between two experiments, by pairs if their scenes agree."""
     condition: Optional[str]
     unit_means: Optional[list[float]]
+    simultaneous: Optional[Interval]
+    equivalence: Optional[Equivalence]
     repeat_se: Optional[float]
     p_error: Optional[float]
     units: Optional[Units]
@@ -279,6 +281,13 @@ class EpisodeName(TypedDict):
     experiment: str
     seed: int
     run: int
+
+
+class Equivalence(TypedDict):
+    """The test of a difference smaller than a margin."""
+    margin: float
+    p_adjusted: float
+    is_shown: bool
 
 
 class _Experiment(TypedDict):
@@ -631,6 +640,8 @@ class _PairTest(TypedDict):
 class PairTest(_PairTest, total=False):
     """One model against another."""
     unit_means: Optional[list[float]]
+    simultaneous: Optional[Interval]
+    equivalence: Optional[Equivalence]
     repeat_se: Optional[float]
     p_error: Optional[float]
     units: Optional[Units]

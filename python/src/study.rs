@@ -156,7 +156,7 @@ impl Study {
             let grouped = self.inner.grouped().map_err(error::of_study)?;
             mirrorstats::statistics(&grouped, &options).map_err(error::of_study)
         })?;
-        answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Short }, None))
+        answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Screen }, None))
     }
 
     fn query(&self, py: Python<'_>, sql: &str) -> PyResult<Table> {

@@ -184,7 +184,7 @@ fn cells_show_lost_episodes_and_unreadable_replies() {
         let expected = if cell["key"]["model"] == "bee" { (json!(2), json!(5)) } else { (Value::Null, Value::Null) };
         assert_eq!((&cell["lost"], &cell["unusable_replies"]), (&expected.0, &expected.1), "{cell}");
     }
-    let shown = run(at, &["stats", "runs"]).done();
+    let shown = run(at, &["stats", "runs", "--tables"]).done();
     let rates = shown.lines().skip_while(|line| !line.contains("Wilson"));
     let rates: Vec<&str> = rates.take_while(|line| !line.is_empty()).collect();
     assert!(rates[1].ends_with("lost  no decision"), "{shown}");
@@ -195,7 +195,7 @@ fn cells_show_lost_episodes_and_unreadable_replies() {
     assert!(table.contains("Beside the numbers: E1 bee 2 lost, 5 of 42 replies without a decision."), "{table}");
     // Without losses and unreadable replies the columns are absent.
     let like = two(|_| ());
-    assert!(!run(like.path(), &["stats", "runs"]).done().contains("no decision"));
+    assert!(!run(like.path(), &["stats", "runs", "--tables"]).done().contains("no decision"));
 }
 
 #[test]

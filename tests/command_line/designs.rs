@@ -76,3 +76,15 @@ fn recorded_and_reconstructed_episodes_are_not_compared() {
         assert_eq!(answer["answer"], "E1 not comparable (kind is reconstruction and recording)", "{answer}");
     }
 }
+
+#[test]
+fn the_gate_lists_a_model_that_lost_every_episode() {
+    let trace = "all-lost-by-status/x.parquet";
+    let gate = run(&folder(), &["gate", trace, trace, "--format", "json"]).ends(4);
+    let found: Value = serde_json::from_str(&gate.stdout).unwrap();
+    let of_b = found["cells"].as_array().unwrap().iter().find(|cell| cell["model"] == "B").unwrap();
+    assert_eq!((&of_b["verdict"], &of_b["base"]["lost"]), (&"cannot_say".into(), &21.into()), "{of_b}");
+    assert_eq!(of_b["why"], "all episodes of BASE were lost (21)");
+    let caveats = found["caveats"].to_string();
+    assert!(caveats.contains("cannot say for B in E1: all 42 episodes were lost"), "{caveats}");
+}

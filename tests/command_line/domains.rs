@@ -118,7 +118,7 @@ fn reports_statistics_figures_and_differences_know_any_domain() {
     run(at, &["table", "verify", "out"]).done();
     let told = asked(at, &["stats", "--by", "model,task"]);
     assert!(told.contains("pull") && told.contains("SUCCESS"), "{told}");
-    let durations = asked(at, &["stats"]);
+    let durations = asked(at, &["stats", "--tables"]);
     assert!(
         durations.contains("Kaplan-Meier") && durations.contains("Durations: unfinished episodes censored"),
         "{durations}"

@@ -3,6 +3,7 @@
 mod design;
 mod direction;
 mod durations;
+mod equality;
 mod losses;
 mod units;
 
@@ -284,7 +285,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
 fn no_episodes_are_not_an_error() {
     let found = statistics(&[]);
     assert_eq!((found.episodes, found.cells.len(), found.models.len()), (0, 0, 0));
-    assert!(found.render(&found.headline, Length::Short, None).starts_with("0 episodes"));
+    assert!(found.render(&found.headline, Length::Tables, None).starts_with("0 episodes"));
 }
 
 #[test]
@@ -326,13 +327,13 @@ fn values_too_large_to_square_are_refused() {
 fn the_text_begins_with_the_answers() {
     let found = recorded(&study());
     let blocks = STUDY.map(|(experiment, model, solved, steps)| format!("{experiment} {model} {solved}/21 in {steps}"));
-    assert_shown!(blocks.join("\n"), found.render(&found.headline, Length::Short, None));
+    assert_shown!(blocks.join("\n"), found.render(&found.headline, Length::Tables, None));
 }
 
 #[test]
 fn names_from_traces_cannot_write_to_the_terminal() {
     let found = statistics(&[block("E1", "evil\u{1b}[2J", 21, 9), block("E1", "b\nc", 0, 9)].concat());
-    let text = found.render(&found.headline, Length::Short, None);
+    let text = found.render(&found.headline, Length::Tables, None);
     assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\u{a}c"));
 }
 

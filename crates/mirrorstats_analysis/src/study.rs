@@ -41,6 +41,8 @@ pub(crate) struct Study<'a> {
     pub relations: Relations,
     /// True to ignore differing settings.
     pub pool: bool,
+    /// The margin of equivalence: of rates below 1, of durations from 1 on.
+    pub margin: Option<f64>,
     ranges: BTreeMap<&'a str, Interval>,
 }
 
@@ -108,7 +110,7 @@ impl<'a> Study<'a> {
         let names = table.metrics.iter().map(|column| column.name.as_str());
         let ranges = names.zip(interval::ranges(table)).collect();
         let relations = Relations::of(&table.catalog);
-        let mut study = Self { table, design, experiments, relations, pool: false, ranges };
+        let mut study = Self { table, design, experiments, relations, pool: false, margin: None, ranges };
         let of_block = |block: &Block| {
             let lost = lost.map_or(0, |lost| lost.of(block.experiment, block.model, block.condition));
             (lost, study.has_repeats(block.rows()))
@@ -255,6 +257,11 @@ impl<'a> Study<'a> {
 
     pub fn better(&self, metric: &str) -> Better {
         self.metric(metric).map_or(Better::Neither, |metric| metric.better)
+    }
+
+    /// The margin of equivalence under a metric; `None` if it is in the unit of others.
+    pub(crate) fn margin_of(&self, column: &MetricColumn) -> Option<f64> {
+        self.margin.filter(|margin| (self.kind(&column.name) == Kind::Rate) == (*margin < 1.0))
     }
 
     /// The least and the largest possible mean of a metric.

@@ -7,8 +7,8 @@ use super::comparisons::unpaired::fisher;
 use super::feasible::first_not;
 use super::intervals::quantile;
 
-/// The power of [`Detectable::likely`].
-pub(crate) const POWER: f64 = 0.8;
+/// The power with which a difference counts as one that would have been shown.
+pub const POWER: f64 = 0.8;
 
 /// The smallest difference of two rates that an exact test of n pairs, or of n episodes on each side, could have shown.
 ///

@@ -68,7 +68,7 @@ fn reconstructions_and_undeclared_traces_have_neither_pairs_nor_clusters() {
         assert!(found.conditions.iter().all(|contrast| contrast.comparison.pairs.is_none()));
         assert_eq!((found.clusters.len(), found.gaps.len()), (0, 0));
         assert!(found.warnings[0].contains(note), "{:?}", found.warnings);
-        let text = found.render(&found.headline, Length::Short, None);
+        let text = found.render(&found.headline, Length::Tables, None);
         assert!(text.contains("Fisher") && !text.contains("pairs of equal") && text.contains(note), "{text}");
     }
 }

@@ -276,7 +276,11 @@ fn opposite_effects_have_no_verdict_over_all_experiments() {
     assert_eq!((row.separated, row.is_crossed, &*row.opposite), (false, true, &["E2".to_owned()][..]));
     let said =
         found.answers.iter().find(|it| it.answer.contains("over all experiments") && it.metric == "TSA").unwrap();
-    assert!(said.answer.contains("over all experiments nobody, cannot say for a and b: opposite in E2"), "{said:?}");
+    assert!(
+        said.answer
+            .contains("over all experiments nobody (80 % power from 0.31), cannot say for a and b: opposite in E2"),
+        "{said:?}"
+    );
 }
 
 // 12 against 100 episodes of one law: 85 % end at 2 to 5, the others at 60 to 78. The small side has no late end.
@@ -310,5 +314,5 @@ fn below_chance_without_a_decision_is_said() {
     let rows: Vec<Row> = (0..21).map(|at| ("E1", "a", at, 0, false, -100)).collect();
     let found = Kind::Scenes.statistics(&rows);
     let said = found.answers.iter().find(|answer| answer.metric == "TSA").unwrap();
-    assert_eq!(said.answer, "E1 nobody (below: a (no decision made in 21 of 21 episodes))");
+    assert_eq!(said.answer, "E1 nobody (below: a (no decision made in 21 of 21 episodes); 80 % power from 0.64)");
 }

@@ -36,7 +36,7 @@ fn chance_is_tested_among_finished_episodes_too() {
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)
     });
     assert_eq!((of("TSA").count(), changed.count()), (32, 5));
-    let text = found.render(&["TSA".to_owned()], Length::Short, None);
+    let text = found.render(&["TSA".to_owned()], Length::Tables, None);
     assert!(text.contains("TSA     chance 1/3") && text.contains("TSA-C   chance 1/3"), "{text}");
 }
 
@@ -131,7 +131,7 @@ fn points(value: &serde_json::Value) -> Vec<String> {
 #[test]
 fn the_dagger_is_explained_only_where_it_is_used() {
     let found = statistics(&[block("E1", "a", 4, 9), block("E1", "b", 0, 9)].concat());
-    let with = found.render(&["MTATO".to_owned()], Length::Short, None);
+    let with = found.render(&["MTATO".to_owned()], Length::Tables, None);
     assert!(with.contains('†') && with.contains("† fewer than 5 defined episodes"), "{with}");
     let without = found.render(&["TTD".to_owned()], Length::Full, None);
     assert!(!without.contains('†') && !without.contains("dagger"), "{without}");

@@ -47,7 +47,7 @@ fn lost_episodes_that_could_turn_a_verdict_withhold_it() {
     assert!((p[0] - BINOMIAL_OF_B[0]).abs() < 1e-9 && (p[1] - BINOMIAL_OF_B[1]).abs() < 1e-9, "{losses:?}");
     assert_eq!(answer(&found, "Who is above", "TSA"), "E1 a, cannot say for b: 10 lost episodes");
     assert!(found.answers.iter().all(|it| it.caveats == ["10 episodes lost"]), "{:?}", found.answers);
-    let text = found.render(&found.headline, Length::Short, None);
+    let text = found.render(&found.headline, Length::Tables, None);
     assert!(text.contains("cannot say") && text.contains("p with lost episodes"), "{text}");
     assert!(text.contains("lost episodes (10 episodes lost)."), "{text}");
 }
@@ -88,7 +88,7 @@ fn each_answer_names_a_filter_by_results_and_pooling() {
     assert_eq!(found.chance[0].verdict, Verdict::Above);
     let expected = ["episodes chosen by their results: `TSA = 1`", "recordings are pooled"];
     assert!(found.answers.iter().all(|answer| answer.caveats == expected), "{:?}", found.answers);
-    let text = found.render(&found.headline, Length::Short, None);
+    let text = found.render(&found.headline, Length::Tables, None);
     assert!(text.contains("E1 a (episodes chosen by their results: `TSA = 1`; recordings are pooled)."), "{text}");
 }
 
@@ -101,7 +101,7 @@ fn the_primary_answer_comes_first_and_families_are_counted() {
     assert!(roles[1..].iter().all(|(_, role)| *role == AnswerRole::Secondary));
     // TSA and TSA-C against chance, TSA and TTD between models.
     assert_eq!(found.families, 4);
-    let text = found.render(&found.headline, Length::Short, None);
+    let text = found.render(&found.headline, Length::Tables, None);
     assert!(text.contains("within each of 4 families of tests; the first answer is primary"), "{text}");
     let table = table(&rows);
     let options = Options { primary: Some("TTD".into()), ..Options::default() };
@@ -113,7 +113,7 @@ fn the_primary_answer_comes_first_and_families_are_counted() {
 fn values_beside_the_verdict_are_in_the_full_text_alone() {
     let rows: Vec<Row> = of("a", 21, 21).chain(of("b", 12, 21)).collect();
     let found = recorded(&rows);
-    let [short, full] = [Length::Short, Length::Full].map(|length| found.render(&found.headline, length, None));
+    let [short, full] = [Length::Tables, Length::Full].map(|length| found.render(&found.headline, length, None));
     assert!(!short.contains("mid-p"), "{short}");
     assert!(full.contains("mid-p"), "{full}");
 }

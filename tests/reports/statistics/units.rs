@@ -144,7 +144,7 @@ fn too_few_episodes_differ_from_no_difference() {
     };
     assert_eq!(answers(2), ["E1 cannot say: 2 episodes", "E1 cannot say: 2 pairs"]);
     assert_eq!(answers(5)[1], "E1 cannot say: 5 pairs");
-    assert_eq!(answers(6), ["E1 all 2", "E1 nobody"]);
+    assert_eq!(answers(6), ["E1 all 2", "E1 nobody (80 % power from 0.96)"]);
     assert_eq!(answers(5)[0], "E1 cannot say: 5 episodes");
 }
 
@@ -228,7 +228,7 @@ fn a_difference_is_shown_with_the_noise_of_repeats() {
     };
     assert!((of("TTD").unwrap() - 0.260_318_204_829_335_3).abs() < 1e-12, "{:?}", of("TTD"));
     assert_eq!(of("TSA"), Some(0.0));
-    let text = found.render(&["TTD".to_owned()], Length::Short, None);
+    let text = found.render(&["TTD".to_owned()], Length::Tables, None);
     assert!(text.contains("SE of repeats"), "{text}");
     let once = with_scenes(&rows.into_iter().filter(|row| row.3 == 0).collect::<Vec<_>>(), RECORDED, by_scene);
     assert_eq!(once.models[0].tests[0].comparison.repeat_se, None);

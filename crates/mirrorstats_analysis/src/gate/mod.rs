@@ -19,12 +19,13 @@ pub use text::GateFormat;
 use self::sides::{GateSides, LossFill, joined};
 use crate::comparable::Varied;
 use crate::statistics::comparisons::compare::{Compared, Comparison};
-use crate::statistics::comparisons::matching::{self, Matched, Scenes, Units};
+use crate::statistics::comparisons::matching::{Matched, Scenes, Units};
 use crate::statistics::{DesignAudit, Options, Replies};
 use crate::study::{Block, Study};
 use mirrorstats_exact::format::{fixed, p_value};
-use mirrorstats_exact::moments::{MomentOverflow, Moments};
+use mirrorstats_exact::moments::MomentOverflow;
 use mirrorstats_metric::catalogs::catalog::{Better, Kind};
+use mirrorstats_score::quality::CellKey;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
 use mirrorstats_statistics::comparisons::holm::{holm, level};
@@ -150,12 +151,25 @@ impl Gate {
         let study = sides::study(&counted, design)?;
         let mut cells = judged(&study, options, barrier.as_deref());
         let lost = [base, new].map(LostCounts::of_table);
+        let all = sides.lost(&lost);
+        let is_known = |cells: &[GateCell], key: &CellKey| {
+            let key = (&*key.experiment, &*key.model, &*key.condition);
+            cells.iter().any(|cell| cell.key() == key)
+        };
+        let unknown: Vec<&CellKey> = all.iter().map(|(key, _)| key).filter(|key| !is_known(&cells, key)).collect();
+        cells.extend(unknown.into_iter().map(GateCell::lost));
         for cell in &mut cells {
             let base_model = sides.base_model(&cell.model);
             let (experiment, model, condition) = cell.key();
             let [earlier, later] = [(&lost[0], base_model.unwrap_or(model)), (&lost[1], model)]
                 .map(|(lost, model)| lost.of(experiment, model, Some(condition)));
             (cell.base.lost, cell.new.lost) = (earlier, later);
+            for (name, side) in [("BASE", cell.base), ("NEW", cell.new)] {
+                if cell.verdict == GateVerdict::NotComparable && side.is_lost() {
+                    cell.verdict = GateVerdict::CannotSay;
+                    cell.why = format!("all episodes of {name} were lost ({})", side.lost);
+                }
+            }
             cell.base_model = base_model.map(str::to_owned);
         }
         if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
@@ -177,7 +191,7 @@ impl Gate {
                 caveats.push(sentence);
             }
         }
-        caveats.extend(DesignAudit::of(&study, &Options::default()).sentences());
+        caveats.extend(DesignAudit::of(&study, &Options { lost: Some(all), ..Options::default() }).sentences());
         for (side, table) in [("BASE", base), ("NEW", new)] {
             let replies = Replies::from_table(table).and_then(|replies| replies.sentence());
             caveats.extend(replies.map(|sentence| format!("{side}: {sentence}")));
@@ -230,20 +244,19 @@ impl Tried {
         let at = |confidence| {
             Compared { study, first: new, second: base, matched: &matched, horizon: None, confidence }.under(column)
         };
+        let is_lower = study.better(&column.name) == Better::Lower;
         if is_rate {
-            let units = units(study, column, [base, new]);
-            let held = units.non_inferior(options.margin);
-            return Self { comparison: at(options.confidence), spread: units.spread(), held };
+            let comparison = at(options.confidence);
+            let gained = if is_lower { comparison.counts.swapped() } else { comparison.counts };
+            return Self { held: gained.non_inferior(options.margin), spread: gained.spread(), comparison };
         }
         // Verdicts on a quantity use its interval, at the Bonferroni level.
         let share = (1.0 - options.confidence) / tests.max(1) as f64;
         let told_apart = at(1.0 - share);
-        // Of a permuted interval only both tails together keep their level.
-        let within = if told_apart.p_error.is_some() { told_apart.clone() } else { at(1.0 - 2.0 * share) };
-        let is_lower = study.better(&column.name) == Better::Lower;
+        let within = told_apart.within(share, at);
         let bound = |interval: Interval| if is_lower { -interval.high } else { interval.low };
         let is_apart = told_apart.interval.is_some_and(|interval| interval.low > 0.0 || interval.high < 0.0);
-        let is_within = within.interval.is_some_and(|interval| bound(interval) > -options.margin);
+        let is_within = within.is_some_and(|interval| bound(interval) > -options.margin);
         let shown = |is_shown: bool| if is_shown { 0.0 } else { 1.0 };
         let comparison = Comparison { p: Some(shown(is_apart)), ..at(options.confidence) };
         let units = comparison.n[0].min(comparison.n[1]);
@@ -255,23 +268,19 @@ impl Tried {
     }
 }
 
-/// The means of both sides by unit; higher is better.
-fn units(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> margin::Units {
-    let is_lower = study.better(&column.name) == Better::Lower;
-    let mean = |mean: f64| if is_lower { 1.0 - mean } else { mean };
-    let (mut old, mut found) = (study.by_unit(base, |row| column.get(row)), margin::Units::default());
-    for (unit, moments) in study.by_unit(new, |row| column.get(row)) {
-        let Some(first) = moments.mean().map(mean) else { continue };
-        match old.remove(&unit).and_then(Moments::mean).map(mean) {
-            Some(second) => found.shared.push((first, second)),
-            None => found.first.push(first),
-        }
+impl GateSide {
+    const fn is_lost(&self) -> bool {
+        self.n == 0 && self.lost > 0
     }
-    found.second.extend(old.into_values().filter_map(Moments::mean).map(mean));
-    found
 }
 
 impl GateCell {
+    /// A cell whose episodes were all lost on each side that has it.
+    fn lost(key: &CellKey) -> Self {
+        let condition = Some(key.condition.clone()).filter(|text| text != sides::DEFAULT);
+        Self { experiment: key.experiment.clone(), model: key.model.clone(), condition, ..Self::default() }
+    }
+
     fn blank(study: &Study, column: &MetricColumn, [base, new]: [Option<&Block>; 2], setting: Option<String>) -> Self {
         let (model, experiment) = new.or(base).map_or(("", ""), |block| (block.model, block.experiment));
         let side = |block: Option<&Block>| {
@@ -310,9 +319,8 @@ impl GateCell {
         let too_few = Comparison { losses: None, ..tried.comparison.clone() }.unsaid(options.confidence);
         let is_mixed = study.unit_name(blocks[0]) != study.unit_name(blocks[1]);
         // Without any difference the exact test shows nothing at any number of units, but a margin may hold.
-        let counted = |units: &Units| usize::try_from(units.n).unwrap_or(usize::MAX);
-        let is_few = |units: &Units| matching::too_few(counted(units), 0.0, options.confidence);
-        let is_held = !is_mixed && !too_few.as_ref().is_some_and(is_few) && p_held.is_some_and(|p| p <= alpha);
+        let is_few = tried.comparison.is_few(options.confidence);
+        let is_held = !is_mixed && !is_few && p_held.is_some_and(|p| p <= alpha);
         let selected = tried.comparison.selected.as_deref();
         let is_apart = too_few.is_none() && p_adjusted.is_some_and(|p| p <= alpha);
         let is_rate = study.kind(&options.metric) == Kind::Rate;

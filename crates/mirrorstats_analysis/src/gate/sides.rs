@@ -12,7 +12,9 @@ use crate::study::{Block, PARTICIPANT, SCENE, Study};
 use mirrorstats_exact::moments::MomentOverflow;
 use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::Better;
+use mirrorstats_score::quality::CellKey;
 use mirrorstats_score::tables::builder::TableBuilder;
+use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::CONDITION;
 use mirrorstats_score::tables::table::{EpisodeTable, Header, KeyRef, MetricColumn};
 use mirrorstats_statistics::design::Design;
@@ -63,6 +65,18 @@ impl<'a> GateSides<'a> {
     /// The earlier name of a model, if it is another one.
     pub(crate) fn base_model(&self, model: &str) -> Option<&'a str> {
         self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old)
+    }
+
+    /// The lost episodes of both sides, under the later names of models.
+    pub(super) fn lost(&self, lost: &[LostCounts; 2]) -> LostCounts {
+        let mut all = LostCounts::default();
+        for (side, lost) in lost.iter().enumerate() {
+            for (key, count) in lost.iter() {
+                let model = self.model(side, &key.model).to_owned();
+                (0..*count).for_each(|_| all.add(CellKey { model: model.clone(), ..key.clone() }));
+            }
+        }
+        all
     }
 
     fn model<'m>(&'m self, side: usize, model: &'m str) -> &'m str {

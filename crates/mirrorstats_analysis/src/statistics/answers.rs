@@ -10,6 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::comparisons::compare::{Comparison, Sign};
+use super::comparisons::family::reach;
 use super::comparisons::losses::LOST;
 use super::comparisons::matching::singular;
 use super::{
@@ -102,8 +103,16 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
     let mut answers = Vec::new();
     let confidence = statistics.confidence;
     for metric in &statistics.headline {
-        for metric in [metric.as_str()].into_iter().chain(statistics.relations.completed(metric)) {
-            answers.extend(Answer::new(ABOVE_CHANCE, metric, &above(statistics, metric)));
+        let whole = above(statistics, metric);
+        let parts = |of: &IndexMap<&str, String>| of.values().cloned().collect::<Vec<String>>();
+        answers.extend(Answer::new(ABOVE_CHANCE, metric, &parts(&whole)));
+        for completed in statistics.relations.completed(metric) {
+            let (same, other): (IndexMap<&str, String>, _) = above(statistics, completed)
+                .into_iter()
+                .partition(|(experiment, part)| whole.get(experiment) == Some(part));
+            let same = same.into_keys().collect::<Vec<_>>().join(", ");
+            let same = (!same.is_empty()).then(|| format!("{same} as {metric}"));
+            answers.extend(Answer::new(ABOVE_CHANCE, completed, &[parts(&other), Vec::from_iter(same)].concat()));
         }
     }
     for metric in &statistics.headline {
@@ -120,7 +129,10 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
             (0, _) => None,
             (_, false) => Some("over all experiments not tested".to_owned()),
             _ if is_unsayable => Some("over all experiments cannot say".to_owned()),
-            (all, true) => Some(differing("over all experiments", all, separated) + &unsaid_pairs(&unsettled)),
+            (all, true) => {
+                let reach = || at_least(OverallRow::reach(&overall, confidence));
+                Some(differing("over all experiments", all, separated, reach) + &unsaid_pairs(&unsettled))
+            }
         }
         .map(|said| said + &opposite(&overall));
         let mut parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
@@ -160,12 +172,20 @@ fn unsaid_pairs(reasons: &[String]) -> String {
     }
 }
 
-fn above(statistics: &Statistics, metric: &str) -> Vec<String> {
+/// The answer in each experiment.
+fn above<'s>(statistics: &'s Statistics, metric: &str) -> IndexMap<&'s str, String> {
     let mut experiments: IndexMap<&str, Vec<&ChanceRow>> = IndexMap::new();
     for row in statistics.chance.iter().filter(|row| row.metric == metric) {
         experiments.entry(&row.key.experiment).or_default().push(row);
     }
-    experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows, statistics)).collect()
+    let of = |(experiment, rows): (&'s str, Vec<&ChanceRow>)| (experiment, above_in(experiment, &rows, statistics));
+    experiments.into_iter().map(of).collect()
+}
+
+/// What an answer without a difference adds, since no difference shown is not equality.
+fn at_least(reach: Option<f64>) -> String {
+    let power = |reach| format!("80 % power from {}", format::fixed(Some(reach), 2));
+    reach.map_or_else(|| "80 % power for no difference".to_owned(), power)
 }
 
 /// The name of a model with what a reader must know of its verdict: the means that it rests on, if the count of episodes
@@ -223,9 +243,12 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], statistics: &Statistics) -> S
     // Qualified names are spelled out.
     let is_plain = rows.iter().all(|row| qualified(row, statistics) == row.key.name());
     let all = if is_plain { rows.len() } else { usize::MAX };
-    let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, all)) };
+    let silent = above.is_empty().then(|| at_least(ChanceRow::reach(&family, confidence)));
+    let below = (!below.is_empty()).then(|| format!("below: {}", names(&below, all)));
+    let notes = below.into_iter().chain(silent).collect::<Vec<_>>().join("; ");
+    let notes = if notes.is_empty() { notes } else { format!(" ({notes})") };
     let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", units.counted()));
-    let verdicts = format!("{about} {}{below}", names(&above, all));
+    let verdicts = format!("{about} {}{notes}", names(&above, all));
     [verdicts].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
 }
 
@@ -295,10 +318,27 @@ fn differing_in(family: &Family, confidence: f64) -> String {
     };
     let unsaid: Vec<String> = comparisons.iter().copied().filter(is_silent).filter_map(reason).collect();
     let unsettled = unsaid_pairs(&unsaid);
-    let differing =
-        differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
+    let pairs = separated.map(|test| (&*test.first, &*test.second));
+    let reach = || at_least(reach(&comparisons, confidence));
+    let differing = differing(&family.experiment, family.tests.len(), pairs, reach);
+    let names: Vec<String> = family.tests.iter().map(|test| format!("{} and {}", test.first, test.second)).collect();
+    let within = within(&names, &comparisons);
     let by_unit = family.tests.iter().filter_map(by_unit);
-    [differing + &unsettled].into_iter().chain(by_unit).chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
+    let parts = [differing + &unsettled].into_iter().chain(within).chain(by_unit).chain(apart(&comparisons));
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// The comparisons whose difference is shown to be within the margin; `None` if no margin was asked for.
+fn within(names: &[String], comparisons: &[&Comparison]) -> Option<String> {
+    let margin = comparisons.iter().find_map(|it| it.equivalence)?.margin;
+    let is_shown = |it: &Comparison| it.equivalence.is_some_and(|it| it.is_shown);
+    let shown: Vec<&str> =
+        names.iter().zip(comparisons).filter(|(_, it)| is_shown(it)).map(|(name, _)| name.as_str()).collect();
+    Some(match shown.len() {
+        0 => format!("none shown to be within {margin}"),
+        count if count > MOST_NAMED => format!("{count} of {} within {margin}", names.len()),
+        _ => format!("within {margin}: {}", shown.join(", ")),
+    })
 }
 
 /// The means of a shown difference, if the counts of episodes point the other way.
@@ -313,8 +353,14 @@ fn by_unit(test: &PairTest) -> Option<String> {
     })
 }
 
-/// The separated pairs, grouped by the better model; `all` is the number of pairs.
-fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n str, &'n str)>) -> String {
+/// The separated pairs, grouped by the better model; `all` is the number of pairs, and `reach` says what would have
+/// been shown.
+fn differing<'n>(
+    about: &str,
+    all: usize,
+    separated: impl Iterator<Item = (&'n str, &'n str)>,
+    reach: impl Fn() -> String,
+) -> String {
     let separated: Vec<_> = separated.collect();
     if separated.len() > MOST_NAMED {
         return format!("{about} {} of {}", separated.len(), format::counted(all as u64, "pair"));
@@ -325,7 +371,7 @@ fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n s
     }
     let over = |(first, seconds): (&str, Vec<&str>)| format!("{first} better than {}", seconds.join(", "));
     let parts: Vec<String> = better.into_iter().map(over).collect();
-    let said = if parts.is_empty() { "nobody".to_owned() } else { parts.join(" and ") };
+    let said = if parts.is_empty() { format!("nobody ({})", reach()) } else { parts.join(" and ") };
     format!("{about} {said}")
 }
 
@@ -344,7 +390,7 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
     };
     let phrase = |what: &str, sign| {
         let models = those(Some(sign));
-        (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
+        (!models.is_empty()).then(|| format!("{what} {}", self::names(&models, group.len())))
     };
     let comparisons: Vec<&Comparison> = group.iter().map(|contrast| &contrast.comparison).collect();
     if let Some(why) = untested(&comparisons, confidence) {
@@ -354,17 +400,20 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
     let silent = group.iter().filter(|contrast| is_silent(&contrast.comparison));
     let (unsaid, shown): (Vec<&&Contrast>, Vec<_>) =
         silent.partition(|it| it.comparison.p.is_none() || it.comparison.unsaid(confidence).is_some());
+    let reach = || at_least(reach(&comparisons, confidence));
     let unshown = match (shown.len(), group.len()) {
         (0, _) => None,
-        (rest, all) if rest == all => Some("no change shown".to_owned()),
-        (rest, _) => Some(format!("no change shown for {rest} more")),
+        (rest, all) if rest == all => Some(format!("no change shown ({})", reach())),
+        (rest, _) => Some(format!("no change shown for {rest} more ({})", reach())),
     };
+    let names: Vec<String> = group.iter().map(|contrast| contrast.name()).collect();
     let unsaid = unsaid.into_iter().map(|contrast| {
         let model = contrast.name();
         let why = contrast.comparison.unsaid(confidence).map_or_else(|| "not tested".to_owned(), |it| it.counted());
         format!("cannot say for {model}: {why}")
     });
     let shown = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown].into_iter().flatten();
-    let parts: Vec<String> = shown.chain(unsaid).chain(apart(&comparisons)).collect();
+    let parts: Vec<String> =
+        shown.chain(unsaid).chain(within(&names, &comparisons)).chain(apart(&comparisons)).collect();
     format!("{baseline} - {against} {}", parts.join(", "))
 }

@@ -12,6 +12,7 @@ mod apart;
 pub(crate) mod comparisons {
     pub(crate) mod compare;
     pub(super) mod conditions;
+    pub(super) mod family;
     pub(super) mod losses;
     pub(crate) mod matching;
     pub(super) mod models;
@@ -40,6 +41,7 @@ pub use answers::{Answer, AnswerRole};
 pub use apart::SettingApart;
 pub use comparisons::compare::{Comparison, Method, Sign};
 pub use comparisons::conditions::Contrast;
+pub use comparisons::family::Equivalence;
 pub use comparisons::losses::{LossCase, LossCases, LossRow, Losses};
 pub use comparisons::matching::{Matching, Units};
 pub use comparisons::models::{Family, Gap, PairTest, Reach};
@@ -155,7 +157,7 @@ impl Statistics {
     /// outside (0, 1), intervals and verdicts are undefined.
     pub fn from_table(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::from_table(table, options.design, options.lost.as_ref(), None)?;
-        study.pool = options.pooled.is_some();
+        (study.pool, study.margin) = (options.pooled.is_some(), options.margin);
         let confidence = options.confidence;
         let headline = conclusions::headline(&study);
         let asked: &[String] = if options.improvements { &headline } else { &[] };

@@ -28,6 +28,8 @@ pub struct Options {
     pub copies: Vec<String>,
     /// The metric of the primary question in a registered plan; the first headline metric by default.
     pub primary: Option<String>,
+    /// The largest difference that counts as none: of rates below 1, of durations from 1 on.
+    pub margin: Option<f64>,
     /// True to compute probabilities of improvement. Each one resamples all episodes of two models.
     pub improvements: bool,
 }
@@ -44,6 +46,7 @@ impl Default for Options {
             caveats: Vec::new(),
             copies: Vec::new(),
             primary: None,
+            margin: None,
             improvements: false,
         }
     }

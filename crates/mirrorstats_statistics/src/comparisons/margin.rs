@@ -1,30 +1,34 @@
-//! Non-inferiority of a rate within a margin: score tests of pairs and of independent units.
+//! A margin, an interval and the reach of a difference of rates: score tests of pairs and of independent units.
 //!
 //! Rule: a unit counts once, as the mean of its episodes. A mean varies at most as much as a single verdict, so the
 //! variance under the null hypothesis is never too small. Up to `MOST_ENUMERATED` outcomes the p value is exact: the
 //! maximum over the rate that the null hypothesis leaves open (Chan 1998). Beyond, it is the normal approximation.
 
+use crate::comparisons::paired::Pairs;
+use crate::comparisons::units::Sides;
 use crate::intervals::clustered::fewest_clusters;
 use crate::intervals::interval::Interval;
-use crate::intervals::quantile::{normal, normal_below};
+use crate::intervals::quantile::{normal, normal_below, settled, tail};
 use crate::power::POWER;
+use crate::sample_size::{Fisher, McNemar, Power as _, Rates, smallest};
+use mirrorstats_exact::moments::Moments;
 
 const MOST_ENUMERATED: usize = 6000;
 /// The number of values tried for the rate that the null hypothesis leaves open.
 const NUISANCE: u32 = 100;
 const TIE: f64 = 1e-9;
+/// The most units whose power is enumerated; beyond, the normal approximation has two correct digits.
+const MOST_EXACT: u64 = 100;
 
-/// The units of two sides: shared units with the means of both, and units of one side alone.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Units {
-    /// The means of the first and of the second side.
-    pub shared: Vec<(f64, f64)>,
-    pub first: Vec<f64>,
-    pub second: Vec<f64>,
+/// The counts of two sides: of shared units, and of units of one side alone. Partial verdicts count as fractions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Counts {
+    pairs: Option<PairCounts>,
+    sides: Option<SideCounts>,
 }
 
-/// Gains, losses and the number of pairs; partial verdicts count as fractions.
-#[derive(Clone, Copy)]
+/// Gains, losses and the number of pairs.
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct PairCounts {
     gains: f64,
     losses: f64,
@@ -32,46 +36,63 @@ struct PairCounts {
 }
 
 /// Successes and the number of units of two sides.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct SideCounts {
     successes: [f64; 2],
     n: [f64; 2],
 }
 
-impl Units {
-    fn pairs(&self) -> Option<PairCounts> {
-        let differences = || self.shared.iter().map(|(a, b)| a - b);
+impl Counts {
+    pub fn of_units(Sides { shared, first, second }: &Sides) -> Self {
+        let mean = |unit: &Moments| unit.mean().unwrap_or_default();
+        let differences = || shared.iter().map(|(a, b)| mean(a) - mean(b));
         let gains = differences().map(|difference| difference.max(0.0)).sum();
         let losses = differences().map(|difference| (-difference).max(0.0)).sum();
-        (!self.shared.is_empty()).then_some(PairCounts { gains, losses, n: self.shared.len() as f64 })
+        let pairs = PairCounts { gains, losses, n: shared.len() as f64 };
+        let successes = [first, second].map(|side| side.iter().map(mean).sum());
+        let sides = SideCounts { successes, n: [first, second].map(|side| side.len() as f64) };
+        Self { pairs: Some(pairs).filter(|it| it.n > 0.0), sides: Some(sides).filter(SideCounts::is_two) }
     }
 
-    fn sides(&self) -> Option<SideCounts> {
-        let (first, second) = (&self.first, &self.second);
-        (!first.is_empty() && !second.is_empty()).then(|| SideCounts {
-            successes: [first.iter().sum(), second.iter().sum()],
-            n: [first.len() as f64, second.len() as f64],
-        })
+    pub fn of_pairs(pairs: Pairs) -> Self {
+        let [gains, losses, n] = [pairs.first_only, pairs.second_only, pairs.n()].map(|count| count as f64);
+        Self { pairs: (n > 0.0).then_some(PairCounts { gains, losses, n }), sides: None }
+    }
+
+    /// The successes and episodes of each side.
+    pub fn of_sides(sides: [(u64, u64); 2]) -> Self {
+        let sides = SideCounts { successes: sides.map(|side| side.0 as f64), n: sides.map(|side| side.1 as f64) };
+        Self { pairs: None, sides: Some(sides).filter(SideCounts::is_two) }
+    }
+
+    /// The second side minus the first.
+    #[must_use]
+    pub fn swapped(self) -> Self {
+        let pairs = |PairCounts { gains, losses, n }| PairCounts { gains: losses, losses: gains, n };
+        let sides = |SideCounts { successes: [a, b], n: [m, n] }| SideCounts { successes: [b, a], n: [n, m] };
+        Self { pairs: self.pairs.map(pairs), sides: self.sides.map(sides) }
     }
 
     /// The units on the smaller side, including pairs.
-    pub fn len(&self) -> u64 {
-        (self.shared.len() + self.first.len().min(self.second.len())) as u64
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of units")]
+    pub fn len(self) -> u64 {
+        let sides = self.sides.map_or(0.0, |sides| sides.n[0].min(sides.n[1]));
+        (self.pairs.map_or(0.0, |pairs| pairs.n) + sides) as u64
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub fn is_empty(self) -> bool {
         self.len() == 0
     }
 
     /// The one-sided p value of the hypothesis that the first rate is below the second by `margin` or more. Pairs and
     /// other units are independent samples: their p values are combined with the square roots of their sizes as weights
     /// (Stouffer). `None` without units to compare, and for a margin outside (0, 1).
-    pub fn non_inferior(&self, margin: f64) -> Option<f64> {
+    pub fn non_inferior(self, margin: f64) -> Option<f64> {
         if !(margin > 0.0 && margin < 1.0) {
             return None;
         }
-        let pairs = self.pairs().map(|pairs| (pairs.p(margin), pairs.n));
-        let sides = self.sides().map(|sides| (sides.p(margin), sides.n[0] * sides.n[1] / (sides.n[0] + sides.n[1])));
+        let pairs = self.pairs.map(|pairs| (pairs.p(margin), pairs.n));
+        let sides = self.sides.map(|sides| (sides.p(margin), sides.weight() / 2.0));
         match (pairs, sides) {
             (Some((p, _)), None) | (None, Some((p, _))) => Some(p),
             (None, None) => None,
@@ -83,14 +104,68 @@ impl Units {
         }
     }
 
+    /// The p value of the hypothesis that the rates differ by `margin` or more: the larger one-sided p value of both
+    /// directions (Schuirmann 1987).
+    pub fn equivalent(self, margin: f64) -> Option<f64> {
+        Some(self.non_inferior(margin)?.max(self.swapped().non_inferior(margin)?))
+    }
+
+    /// The score interval of the difference: pairs by Tango (1998), other units by Mee (1984). Where there are both, their
+    /// differences have the weights of the exact test (`units::difference_test`). `None` without units to compare, and
+    /// for a confidence outside (0, 1).
+    pub fn interval(self, confidence: f64) -> Option<Interval> {
+        let deviate = normal(tail(confidence)?);
+        let (low, high) = (self.lowest(deviate)?, -self.swapped().lowest(deviate)?);
+        Some(Interval { low: settled(low), high: settled(high) })
+    }
+
+    /// The smallest difference that the score test does not reject at this deviate.
+    fn lowest(self, deviate: f64) -> Option<f64> {
+        let score = |difference: f64| {
+            let pairs = self.pairs.map(|pairs| (pairs.estimate(), pairs.variance(difference), pairs.n));
+            let sides = self.sides.map(|sides| (sides.estimate(), sides.variance(difference), sides.weight()));
+            let parts = || pairs.iter().chain(&sides);
+            let excess: f64 = parts().map(|(estimate, _, weight)| weight * (estimate - difference)).sum();
+            let variance: f64 = parts().map(|(_, variance, weight)| weight * weight * variance).sum();
+            let estimate = parts().map(|(estimate, _, weight)| weight * estimate).sum::<f64>();
+            (excess / variance.max(f64::MIN_POSITIVE).sqrt(), estimate / parts().map(|it| it.2).sum::<f64>())
+        };
+        let (at_least, estimate) = score(-1.0);
+        if self.is_empty() || at_least <= deviate {
+            return (!self.is_empty()).then_some(-1.0);
+        }
+        let (mut below, mut within) = (-1.0, estimate);
+        for _ in 0..50 {
+            let middle = f64::midpoint(below, within);
+            if score(middle).0 > deviate { below = middle } else { within = middle }
+        }
+        Some(within)
+    }
+
+    /// The smallest true difference that the exact test of so many units shows with a probability of 0.8 at `level`: of
+    /// pairs at their share of discordance, of other units around their mean rate. `None` if there is none.
+    pub fn detectable(self, level: f64) -> Option<f64> {
+        let n = self.len();
+        if n > MOST_EXACT {
+            return self.spread().map(|spread| spread.detectable(level));
+        }
+        if let Some(SideCounts { successes: [a, b], n: [m, k] }) = self.sides {
+            let lower = |difference: f64| ((a + b) / (m + k) - difference / 2.0).clamp(0.0, 1.0 - difference);
+            let rates = |difference| Rates { lower: lower(difference), higher: lower(difference) + difference };
+            return smallest(POWER, 1.0, |difference| Fisher { level, rates: rates(difference) }.power(n));
+        }
+        let discordant = self.pairs.map(|pairs| (pairs.gains + pairs.losses) / pairs.n)?;
+        smallest(POWER, 1.0, |difference| McNemar::new(level, difference, discordant.max(difference)).power(n))
+    }
+
     /// The spread of the difference, after adding half a success and half a failure.
-    pub fn spread(&self) -> Option<Spread> {
+    pub fn spread(self) -> Option<Spread> {
         let share = |successes: f64, n: f64| (successes + 0.5) / (n + 1.0);
-        let pairs = self.pairs().map(|PairCounts { gains, losses, n }| {
+        let pairs = self.pairs.map(|PairCounts { gains, losses, n }| {
             let (gained, lost) = (share(gains, n), share(losses, n));
             ((gains - losses) / n, gained + lost - (gained - lost).powi(2), n)
         });
-        let sides = self.sides().map(|SideCounts { successes: [a, b], n: [m, n] }| {
+        let sides = self.sides.map(|SideCounts { successes: [a, b], n: [m, n] }| {
             let (p, q) = (share(a, m), share(b, n));
             (a / m - b / n, p * (1.0 - p) + q * (1.0 - q), m.min(n))
         });
@@ -119,6 +194,11 @@ impl Spread {
         Self { gain, variance: units as f64 * se * se, units }
     }
 
+    /// The smallest true difference that is shown with a probability of 0.8 at this two-sided level.
+    pub fn detectable(self, level: f64) -> f64 {
+        (normal(level / 2.0) + normal(1.0 - POWER)) * (self.variance / self.units as f64).sqrt()
+    }
+
     /// The number of units per side that makes one verdict likely, if the difference stays unchanged. `level` is
     /// two-sided for a difference and one-sided for the margin; the power is 0.8. `None` if more units bring no verdict
     /// closer. At least as many as any exact test needs. If so many gave no verdict yet, the approximation is too
@@ -138,15 +218,22 @@ impl Spread {
 }
 
 impl PairCounts {
-    /// The score statistic of Tango (1998) for a difference of at most `-margin`.
-    fn score(self, margin: f64) -> f64 {
+    fn estimate(self) -> f64 {
+        (self.gains - self.losses) / self.n
+    }
+
+    /// The variance of the estimate for this true difference, by the most likely share of losses (Tango 1998).
+    fn variance(self, difference: f64) -> f64 {
         let Self { gains, losses, n } = self;
-        let least = -margin;
-        let b = gains + losses + least * (gains - losses) - 2.0 * n * least;
-        let root = (b * b + 8.0 * n * losses * least * (1.0 - least)).max(0.0).sqrt();
-        let lost = ((b + root) / (4.0 * n)).clamp(margin, f64::midpoint(1.0, margin));
-        let variance = n * (2.0 * lost + least - least * least);
-        (gains - losses - n * least) / variance.max(f64::MIN_POSITIVE).sqrt()
+        let b = gains + losses + difference * (gains - losses) - 2.0 * n * difference;
+        let root = (b * b + 8.0 * n * losses * difference * (1.0 - difference)).max(0.0).sqrt();
+        let lost = ((b + root) / (4.0 * n)).clamp((-difference).max(0.0), (1.0 - difference) / 2.0);
+        (2.0 * lost + difference - difference * difference) / n
+    }
+
+    /// The score statistic for a difference of at most `-margin`.
+    fn score(self, margin: f64) -> f64 {
+        (self.estimate() + margin) / self.variance(-margin).max(f64::MIN_POSITIVE).sqrt()
     }
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of units")]
@@ -173,13 +260,29 @@ impl PairCounts {
 }
 
 impl SideCounts {
+    fn is_two(&self) -> bool {
+        self.n.iter().all(|n| *n > 0.0)
+    }
+
+    /// The harmonic mean of the sizes.
+    fn weight(self) -> f64 {
+        2.0 * self.n[0] * self.n[1] / (self.n[0] + self.n[1])
+    }
+
+    fn estimate(self) -> f64 {
+        self.successes[0] / self.n[0] - self.successes[1] / self.n[1]
+    }
+
+    /// The variance of the estimate for this true difference, by the most likely rates.
+    fn variance(self, difference: f64) -> f64 {
+        let second = restricted(self.successes, self.n, -difference);
+        let first = second + difference;
+        first * (1.0 - first) / self.n[0] + second * (1.0 - second) / self.n[1]
+    }
+
     /// The score statistic of Farrington and Manning (1990) for a difference of at most `-margin`.
     fn score(self, margin: f64) -> f64 {
-        let Self { successes: [a, b], n: [m, n] } = self;
-        let second = restricted([a, b], [m, n], margin);
-        let first = second - margin;
-        let variance = first * (1.0 - first) / m + second * (1.0 - second) / n;
-        (a / m - b / n + margin) / variance.max(f64::MIN_POSITIVE).sqrt()
+        (self.estimate() + margin) / self.variance(-margin).max(f64::MIN_POSITIVE).sqrt()
     }
 
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of units")]
@@ -205,7 +308,7 @@ impl SideCounts {
     }
 }
 
-/// The maximum-likelihood second rate if the first is lower by `margin`; the likelihood rises, then falls. By Newton's
+/// The maximum-likelihood second rate if the first is lower by `margin`, higher if it is negative; the likelihood rises, then falls. By Newton's
 /// method, within bounds that halve where it leaves them.
 fn restricted([a, b]: [f64; 2], [m, n]: [f64; 2], margin: f64) -> f64 {
     // The slope of the log-likelihood, and how fast it falls.
@@ -218,7 +321,7 @@ fn restricted([a, b]: [f64; 2], [m, n]: [f64; 2], margin: f64) -> f64 {
         let (first, second) = (part(a, m, second - margin), part(b, n, second));
         (first.0 + second.0, first.1 + second.1)
     };
-    let (mut low, mut high) = (margin, 1.0);
+    let (mut low, mut high) = (margin.max(0.0), 1.0 + margin.min(0.0));
     let mut at = f64::midpoint(low, high);
     for _ in 0..60 {
         let (value, fall) = slope(at);
@@ -263,20 +366,17 @@ const fn real(count: usize) -> f64 {
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::Units;
+    use super::{Counts, Interval, PairCounts};
+    use crate::comparisons::units::Sides;
+    use mirrorstats_exact::moments::Moments;
 
-    fn pairs(gains: usize, losses: usize, n: usize) -> Units {
-        let shared = (0..n).map(|at| match at {
-            at if at < gains => (1.0, 0.0),
-            at if at < gains + losses => (0.0, 1.0),
-            _ => (1.0, 1.0),
-        });
-        Units { shared: shared.collect(), ..Units::default() }
+    fn pairs(gains: u32, losses: u32, n: u32) -> Counts {
+        let [gains, losses, n] = [gains, losses, n].map(f64::from);
+        Counts { pairs: Some(PairCounts { gains, losses, n }), sides: None }
     }
 
-    fn sides(successes: [usize; 2], n: [usize; 2]) -> Units {
-        let of = |side: usize| (0..n[side]).map(|at| f64::from(u8::from(at < successes[side]))).collect();
-        Units { shared: Vec::new(), first: of(0), second: of(1) }
+    fn sides(successes: [u64; 2], n: [u64; 2]) -> Counts {
+        Counts::of_sides([0, 1].map(|side| (successes[side], n[side])))
     }
 
     fn close(found: Option<f64>, expected: f64) {
@@ -298,15 +398,59 @@ mod tests {
 
     #[test]
     fn repeats_of_a_unit_count_once_and_no_units_give_no_test() {
-        let repeated = Units { shared: vec![(2.0 / 3.0, 2.0 / 3.0); 3], ..Units::default() };
+        let unit = Moments::default().with_truths(1, 2).unwrap();
+        let repeated = Counts::of_units(&Sides { shared: vec![(unit, unit); 3], ..Sides::default() });
         close(repeated.non_inferior(0.1), 0.9_f64.powi(3));
-        assert_eq!(Units::default().non_inferior(0.1), None);
+        assert_eq!(Counts::default().non_inferior(0.1), None);
         for margin in [0.0, 1.0, -0.1, f64::NAN] {
             assert_eq!(pairs(0, 0, 9).non_inferior(margin), None);
         }
         // Pairs and other units together have more power than either alone.
-        let both = Units { first: vec![1.0; 21], second: vec![1.0; 21], ..pairs(0, 0, 21) };
+        let both = Counts { sides: sides([21, 21], [21, 21]).sides, ..pairs(0, 0, 21) };
         assert!(both.non_inferior(0.1).unwrap() < pairs(0, 0, 21).non_inferior(0.1).unwrap());
+    }
+
+    fn bounds(found: Option<Interval>, low: f64, high: f64) {
+        let Interval { low: a, high: b } = found.unwrap();
+        assert!((a - low).abs() < 1e-7 && (b - high).abs() < 1e-7, "{found:?}, not [{low}, {high}]");
+    }
+
+    // scipy 1.17.1: brentq over score statistics whose shares are minimize_scalar's. The same code gives the published
+    // intervals by Mee's method of 56/70 - 48/80 (0.0533 to 0.3377) and 9/10 - 3/10 (Newcombe 1998, 17:873, table II).
+    #[test]
+    fn score_intervals_match_known_values() {
+        bounds(pairs(2, 1, 21).interval(0.95), -0.15484121716527213, 0.25504228912865023);
+        bounds(pairs(0, 0, 6).interval(0.95), -0.390334287902176, 0.390334287902176);
+        bounds(pairs(7, 0, 7).interval(0.95), 0.29133912986662486, 1.0);
+        bounds(sides([56, 48], [70, 80]).interval(0.95), 0.05333384928083425, 0.3377294637733367);
+        bounds(sides([9, 3], [10, 10]).interval(0.95), 0.1821264998239676, 0.8369503311461316);
+        bounds(sides([12, 0], [12, 12]).interval(0.95), 0.7240475906500395, 1.0);
+        let of_both = Counts { sides: sides([5, 2], [6, 9]).sides, ..pairs(3, 1, 8) };
+        bounds(of_both.interval(0.95), 0.06955168981882004, 0.6834946478084333);
+        let thirds = Counts { pairs: Some(PairCounts { gains: 3.5, losses: 1.0 / 3.0, n: 12.0 }), sides: None };
+        bounds(thirds.interval(0.95), -0.07504813932121189, 0.5564461679326226);
+        assert_eq!((Counts::default().interval(0.95), pairs(1, 0, 9).interval(1.0)), (None, None));
+    }
+
+    // scipy 1.17.1: brentq over the power, all outcomes enumerated by binom.pmf with binomtest or fisher_exact; of 6 pairs
+    // 0.8 ** (1 / 6); of 200 pairs (norm.isf(0.0125) + norm.isf(0.2)) * sqrt((15 / 201 - (4 / 201) ** 2) / 200).
+    #[test]
+    fn the_smallest_difference_that_would_have_been_shown_matches_known_values() {
+        close(pairs(0, 0, 6).detectable(0.05), 0.9634924839989961);
+        close(pairs(4, 3, 21).detectable(0.05 / 3.0), 0.40009419143095104);
+        close(sides([9, 7], [12, 15]).detectable(0.05), 0.5870758413141641);
+        close(sides([11, 2], [21, 21]).detectable(0.05 / 28.0), 0.5481496894021536);
+        close(pairs(5, 9, 200).detectable(0.025), 0.05939557317573504);
+        assert_eq!((pairs(0, 0, 5).detectable(0.05), Counts::default().detectable(0.05)), (None, None));
+    }
+
+    // scipy 1.17.1, as for one direction: 29 pairs without a difference, and 21 pairs with two gains and a loss, of which
+    // the larger p value is that of a gain of the margin.
+    #[test]
+    fn equivalence_needs_both_directions() {
+        close(pairs(0, 0, 29).equivalent(0.1), 0.0486221739187105);
+        let [found, turned] = [pairs(2, 1, 21), pairs(1, 2, 21)].map(|it| it.equivalent(0.1));
+        assert!(found == turned && found > pairs(2, 1, 21).non_inferior(0.1), "{found:?}");
     }
 
     // (norm.isf(0.05) + norm.isf(0.2)) ** 2 is 6.182557232; half of one of 21 pairs in each direction: variance 1/22.

@@ -22,6 +22,8 @@ pub const MEDIAN: u64 = 4;
 pub const DIFFERENCE: u64 = 12;
 /// A difference of means by Welch's t, episodes on each side.
 pub const WELCH: u64 = 8;
+/// A difference of rates by unit, units on the smaller side.
+pub const UNITS: u64 = 6;
 /// A mean by clusters, with t(clusters - 1).
 pub const CLUSTERS: u64 = 2;
 

@@ -96,6 +96,6 @@ impl GateArgs {
     }
 }
 
-fn margin(text: &str) -> Result<f64, String> {
+pub fn margin(text: &str) -> Result<f64, String> {
     number(text, "a number above 0 such as 0.1", |value| value > 0.0 && value.is_finite())
 }

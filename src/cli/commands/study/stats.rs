@@ -28,14 +28,21 @@ pub struct StatsArgs {
     /// Confidence of every interval; tests are at one minus it
     #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = confidence)]
     pub confidence: f64,
-    /// Metrics to print tables for, or `all` [default: those with a chance level, and time to decision]
+    /// The largest difference that counts as none; answers name what is shown to be within it: of rates below 1, of durations
+    /// from 1 on
+    #[arg(long, value_name = "DIFFERENCE", value_parser = super::gate::margin)]
+    pub margin: Option<f64>,
+    /// Metrics to print the tables of, or `all` [default: those with a chance level, and time to decision]
     #[arg(long = "metric", value_name = "NAME")]
     pub metrics: Vec<String>,
-    /// Print every interval, plain means, clusters, and the differences that the data could have shown
+    /// Print the numbers behind the answers; `--metric` and `--by` do so too
+    #[arg(long)]
+    pub tables: bool,
+    /// Print every row and interval, plain means, clusters, and the differences that the data could have shown
     #[arg(long)]
     pub full: bool,
     /// Intervals and tests of rates that stay valid if you look after every episode of a running study
-    #[arg(long, conflicts_with_all = ["by", "full"])]
+    #[arg(long, conflicts_with_all = ["by", "margin", "tables", "full"])]
     pub sequential: bool,
     /// A registered plan: each departure of the analysis from it is listed
     #[arg(long, value_name = "FILE")]
@@ -50,8 +57,8 @@ impl StatsArgs {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let study = with_plan(self.traces.study(&scoring, &self.grouping)?, self.plan.as_deref())?;
-        let (confidence, improvements) = (self.confidence, self.full || self.json);
-        let options = Options { confidence, improvements, ..Options::default() };
+        let (confidence, margin, improvements) = (self.confidence, self.margin, self.full || self.json);
+        let options = Options { confidence, margin, improvements, ..Options::default() };
         if self.sequential {
             self.print_sequential(&sequential(&study, &options)?)
         } else {
@@ -65,7 +72,11 @@ impl StatsArgs {
         }
         let metrics = statistics.cells.iter().map(|cell| cell.metric.as_str());
         let chosen = self.chosen("metric", metrics, &statistics.headline)?;
-        let length = if self.full { Length::Full } else { Length::Short };
+        let length = match self {
+            Self { full: true, .. } => Length::Full,
+            _ if self.tables || self.grouping.by.is_some() || !self.metrics.is_empty() => Length::Tables,
+            _ => Length::Screen,
+        };
         output::plain(statistics.render(&chosen, length, terminal::width()))
     }
 

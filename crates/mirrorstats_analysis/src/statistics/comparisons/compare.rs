@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward, settle};
+use crate::statistics::comparisons::family::Equivalence;
+use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward};
 use crate::statistics::comparisons::matching::{Matched, Sides, Units, outcomes};
 use crate::statistics::comparisons::retest::repeat_variance;
 use crate::statistics::rates::durations::{decided, is_duration};
@@ -14,6 +15,7 @@ use mirrorstats_exact::moments::Moments;
 use mirrorstats_metric::catalogs::catalog::{Kind, Metric, StandardError};
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::comparisons::holm::{is_significant, level};
+use mirrorstats_statistics::comparisons::margin::Counts;
 use mirrorstats_statistics::comparisons::paired::Pairs;
 use mirrorstats_statistics::comparisons::units;
 use mirrorstats_statistics::comparisons::unpaired::{fisher, newcombe, welch};
@@ -71,6 +73,12 @@ pub struct Comparison {
     pub interval: Option<Interval>,
     /// The reason why there is no interval.
     pub withheld: Option<Withheld>,
+    /// The interval that holds together with those of all tests of the family (Bonferroni).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub simultaneous: Option<Interval>,
+    /// The test of a difference within the margin that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub equivalence: Option<Equivalence>,
     /// The standard error from repeats alone: by how much the difference of means varies if the same scenes are played
     /// again; none unless both sides repeat scenes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -100,6 +108,9 @@ pub struct Comparison {
     /// The setting in which the two sides were recorded differently, so that nothing is compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub incomparable: Option<String>,
+    /// The counts of a rate by unit; empty for other metrics.
+    #[serde(skip)]
+    pub(crate) counts: Counts,
 }
 
 pub(crate) struct Compared<'s, 'a> {
@@ -198,16 +209,21 @@ impl Compared<'_, '_> {
         let pairs = self.matched.pairs.as_ref().filter(|_| !self.is_dependent());
         let [first, second] = sides.means();
         let unit_means = first.zip(second).map(<[f64; 2]>::from);
-        Comparison {
+        let counts = sides.divided().map(|units| Counts::of_units(&units)).unwrap_or_default();
+        let found = Comparison {
             successes: a.counts().zip(b.counts()).map(|(a, b)| [a.0, b.0]),
             difference: test.map(|test| test.difference).or_else(|| unit_means.map(|[a, b]| a - b)),
             unit_means,
-            withheld: Some(Withheld::Dependent),
             pairs: pairs.map(|rows| outcomes(column, rows)),
             p: test.map(|test| test.p),
             units: Some(Units::between(self.study, [self.first, self.second], sides, least, self.confidence)),
+            counts,
             ..Comparison::of(Method::Units, [a.n, b.n])
-        }
+        };
+        // Without a test, the means of the units are not the estimate that the interval is of.
+        let interval = test.and_then(|_| found.rate_interval(self.confidence));
+        let (interval, withheld) = coverage::given(interval, counts.len(), coverage::UNITS, true);
+        Comparison { interval, withheld, ..found }
     }
 
     /// Compares a duration by unit if all its times up to the horizon are known; other quantities have no test.
@@ -276,14 +292,15 @@ impl Compared<'_, '_> {
     fn paired_rate(&self, lost: Option<Toward>, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
         let seen = outcomes(column, rows);
         let pairs = lost.map_or(seen, |toward| toward.pairs(seen, self.lost()));
-        Comparison {
+        let found = Comparison {
             successes: Some([pairs.both + pairs.first_only, pairs.both + pairs.second_only]),
             pairs: Some(pairs),
             undefined: rows.len() as u64 - seen.n(),
             difference: pairs.difference(),
-            interval: pairs.interval(self.confidence),
+            counts: Counts::of_pairs(pairs),
             ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(pairs.test())
-        }
+        };
+        Comparison { interval: found.rate_interval(self.confidence), ..found }
     }
 
     fn paired_quantity(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
@@ -307,12 +324,13 @@ impl Compared<'_, '_> {
         let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
         let counted = rates.then(|| a.counts().zip(b.counts())).flatten();
         if let Some((first, second)) = counted {
-            return Comparison {
+            let found = Comparison {
                 successes: Some([first.0, second.0]),
                 difference,
-                interval: newcombe(first, second, self.confidence),
+                counts: Counts::of_sides([first, second]),
                 ..Comparison::of(Method::Fisher, [a.n, b.n]).tested(fisher(first, second))
             };
+            return Comparison { interval: found.rate_interval(self.confidence), ..found };
         }
         let spread = [a, b].iter().any(|side| side.se(StandardError::Sample).is_some_and(|se| se > 0.0));
         let (interval, withheld) =
@@ -415,6 +433,15 @@ impl Comparison {
         }
     }
 
+    /// The interval of a difference of rates.
+    pub(crate) fn rate_interval(&self, confidence: f64) -> Option<Interval> {
+        match (self.method, self.pairs, self.successes, self.n) {
+            (Method::Mcnemar, Some(pairs), ..) => pairs.interval(confidence),
+            (Method::Fisher, _, Some([k, l]), [m, n]) => newcombe((k, m), (l, n), confidence),
+            _ => self.counts.interval(confidence),
+        }
+    }
+
     fn tested(self, test: Option<ExactTest>) -> Self {
         Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), ..self }
     }
@@ -462,14 +489,4 @@ fn fewest_of(confidence: f64) -> u64 {
 pub enum Sign {
     Higher,
     Lower,
-}
-
-pub(crate) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
-    let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
-    let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };
-    let settled = settle(tested.iter_mut().map(|it| (seen(it), &mut it.losses)), confidence);
-    for (comparison, (p, is_shown)) in tested.into_iter().zip(settled) {
-        comparison.p_adjusted = Some(p);
-        comparison.separated = is_shown && !comparison.units.as_ref().is_some_and(|units| units.too_few);
-    }
 }

@@ -5,7 +5,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::comparable::tasks_differ;
-use crate::statistics::comparisons::compare::{Compared, Comparison, adjust};
+use crate::statistics::comparisons::compare::{Compared, Comparison};
+use crate::statistics::comparisons::family::adjust;
 use crate::statistics::comparisons::matching::{Matched, Matching, Scenes};
 use crate::study::{Block, Experiment, Study, named};
 use mirrorstats_score::tables::table::MetricColumn;
@@ -76,10 +77,14 @@ impl Contrast {
         let mut contrasts = Vec::new();
         for pair in Self::pairs(study) {
             let (mut family, columns) = (Vec::new(), pair.columns(study));
-            for (first, second) in pair.couples() {
-                let matched = Matched::of(&Scenes::of(study, first), &Scenes::of(study, second));
-                let compared = Compared { study, first, second, matched: &matched, horizon: None, confidence };
-                let incomparable = study.incomparable(first, second);
+            let matched = |(first, second)| Matched::of(&Scenes::of(study, first), &Scenes::of(study, second));
+            let couples: Vec<_> = pair.couples().map(|couple| (couple, matched(couple))).collect();
+            let compared = |at: usize, column: &MetricColumn, confidence| {
+                let ((first, second), matched) = &couples[at];
+                let compared = Compared { study, first, second, matched, horizon: None, confidence };
+                compared.under(column).unless(study.incomparable(first, second))
+            };
+            for (at, ((first, second), matched)) in couples.iter().enumerate() {
                 let under = |column: &MetricColumn| Self {
                     model: first.model.to_owned(),
                     condition: first.condition(),
@@ -87,15 +92,17 @@ impl Contrast {
                     baseline: first.experiment.to_owned(),
                     against: second.experiment.to_owned(),
                     matching: matched.matching,
-                    comparison: compared.under(column).unless(incomparable.clone()),
+                    comparison: compared(at, column, confidence),
                 };
-                family.extend(columns.iter().map(|column| under(column)));
+                family.extend(columns.iter().map(|column| (at, under(column))));
             }
             for column in columns {
-                let of_metric = family.iter_mut().filter(|it: &&mut Self| it.metric == column.name);
-                adjust(of_metric.map(|it| &mut it.comparison), confidence);
+                let of_metric = family.iter_mut().filter(|(_, it): &&mut (usize, Self)| it.metric == column.name);
+                let again = |at: usize| move |confidence| compared(at, column, confidence);
+                let of_metric = of_metric.map(|(at, it)| (&mut it.comparison, again(*at)));
+                adjust(of_metric, study.margin_of(column), confidence);
             }
-            contrasts.extend(family);
+            contrasts.extend(family.into_iter().map(|(_, contrast)| contrast));
         }
         contrasts
     }

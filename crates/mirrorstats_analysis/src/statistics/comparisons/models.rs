@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::compare::{Compared, Comparison, Method, adjust};
+use crate::statistics::comparisons::compare::{Compared, Comparison, Method};
+use crate::statistics::comparisons::family::adjust;
 use crate::statistics::comparisons::matching::{Matched, Matching, Scenes};
 use crate::statistics::rates::durations::{self, is_duration};
 use crate::study::{Block, Experiment, RowKey, Study};
@@ -110,14 +111,14 @@ impl<'s, 'a> MatchedBlocks<'s, 'a> {
         column: &MetricColumn,
         (first, second): (usize, usize),
         asked: (Option<i64>, f64),
-    ) -> PairTest {
+    ) -> (PairTest, (usize, usize)) {
         let found = self.test(column, (first, second), asked);
         let is_lower = self.study.better(&column.name) == Better::Lower;
         let is_worse = |difference: f64| if is_lower { difference > 0.0 } else { difference < 0.0 };
         if found.comparison.difference.is_some_and(is_worse) {
-            return self.test(column, (second, first), asked);
+            return (self.test(column, (second, first), asked), (second, first));
         }
-        found
+        (found, (first, second))
     }
 
     fn gaps(&self) -> Vec<Gap> {
@@ -181,7 +182,13 @@ impl Family {
         for (at, &first) in order.iter().enumerate() {
             tests.extend(order[at + 1..].iter().map(|&second| field.better_first(column, (first, second), asked)));
         }
-        adjust(tests.iter_mut().map(|test| &mut test.comparison), asked.1);
+        let (horizon, confidence) = asked;
+        let family = tests.iter_mut().map(|(test, pair)| {
+            let again = |confidence| field.test(column, *pair, (horizon, confidence)).comparison;
+            (&mut test.comparison, again)
+        });
+        adjust(family, field.study.margin_of(column), confidence);
+        let tests: Vec<PairTest> = tests.into_iter().map(|(test, _)| test).collect();
         let models: Vec<String> = order.iter().map(|&at| field.blocks[at].name()).collect();
         let tied = tied_sets(models.len(), |a, b| tests[triangle(models.len(), a, b)].comparison.separated);
         Self {

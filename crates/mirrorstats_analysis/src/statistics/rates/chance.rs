@@ -17,6 +17,8 @@ use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::chance::{exact_test, least_p};
 use mirrorstats_statistics::comparisons::holm::level;
 use mirrorstats_statistics::comparisons::units::{mean, rate_test};
+use mirrorstats_statistics::power::POWER;
+use mirrorstats_statistics::sample_size::{OneRate, Power as _, smallest};
 
 /// One rate against one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -183,6 +185,17 @@ impl ChanceRow {
             || Units { n: self.n, name: "episodes".to_owned(), too_few: few_episodes(self.n, self.level, confidence) };
         let units = self.units.clone().unwrap_or_else(episodes);
         units.too_few.then_some(units).or_else(|| LossCases::unsettled(self.losses.as_ref()))
+    }
+
+    /// The smallest rate above the level that each of these rows would have shown with a probability of 0.8, at the first
+    /// step of Holm's procedure.
+    pub(crate) fn reach(family: &[&Self], confidence: f64) -> Option<f64> {
+        let first_step = level(confidence)? / family.len() as f64;
+        let said = family.iter().filter(|row| row.unsaid(confidence).is_none());
+        let (n, chance) =
+            said.map(|row| (row.units.as_ref().map_or(row.n, |units| units.n), row.level)).min_by_key(|it| it.0)?;
+        let power = |above| OneRate { level: first_step, chance, rate: chance.value() + above }.power(n);
+        Some(chance.value() + smallest(POWER, 1.0 - chance.value(), power)?)
     }
 
     /// The largest number of units or episodes, if no outcome of these models could pass Holm's first step.

@@ -18,6 +18,7 @@ use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::comparisons::holm::{is_significant, level};
 use mirrorstats_statistics::comparisons::improvement::{Improvement, probability_of_improvement};
+use mirrorstats_statistics::comparisons::margin::{Counts, Spread};
 use mirrorstats_statistics::comparisons::stratified::{Stratum, common_difference, exact, pooled};
 use mirrorstats_statistics::durations::competing::Outcome;
 use mirrorstats_statistics::intervals::clustered::fewest_clusters;
@@ -136,7 +137,9 @@ impl<'s, 'a> Couple<'s, 'a> {
             let test = sides.test(&lost);
             let p = test.filter(|_| !few).map(|test| test.p);
             let difference = test.map(|test| test.difference);
-            OverallRow { method: OverallMethod::Units, difference, interval: None, p, mid_p: None, ..row }
+            let counts = sides.divided().filter(|_| p.is_some()).map(|units| Counts::of_units(&units));
+            let interval = counts.and_then(|counts| counts.interval(confidence));
+            OverallRow { method: OverallMethod::Units, difference, interval, p, mid_p: None, ..row }
         };
         let case = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
         let row = of(None);
@@ -229,6 +232,14 @@ fn adjust(rows: &mut [OverallRow], confidence: f64) {
 }
 
 impl OverallRow {
+    /// The smallest true difference that each of these tests would have shown with a probability of 0.8, at the first
+    /// step of Holm's procedure, by the widths of their intervals.
+    pub(crate) fn reach(rows: &[&Self], confidence: f64) -> Option<f64> {
+        let level = level(confidence)? / rows.iter().filter(|row| row.p.is_some()).count().max(1) as f64;
+        let reach = |interval| Spread::of_interval(0.0, interval, confidence, 1).detectable(level);
+        rows.iter().filter_map(|row| row.interval.filter(|_| !row.separated)).map(reach).max_by(f64::total_cmp)
+    }
+
     /// Withholds the verdict if one experiment alone shows the opposite: a qualitative interaction (Gail and Simon
     /// 1985), over which no difference is common to all. Both have the better model first.
     fn within(self, families: &[Family], confidence: f64) -> Self {

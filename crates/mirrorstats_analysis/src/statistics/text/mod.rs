@@ -14,11 +14,19 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_tables::{Table, push_wrapped};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The most characters of caveats that each answer repeats.
+const MOST_REPEATED: usize = 120;
+
+/// The most models whose ranks are printed before `--full`; others are counted.
+const MOST_RANKED: usize = 12;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Length {
-    /// The answers and the numbers behind them.
-    Short,
-    /// Everything: further intervals, plain means, clusters, detectable differences.
+    /// One screen: the audit, the answers, tied models, and what cannot be concluded.
+    Screen,
+    /// The numbers behind the answers, too.
+    Tables,
+    /// Everything: every row and interval, plain means, clusters, detectable differences.
     Full,
 }
 
@@ -38,26 +46,30 @@ impl Statistics {
         push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
         audit(&mut text, &statistics.audit, width);
         departures(&mut text, statistics.departures.as_deref(), width);
-        list(&mut text, &heading(statistics), &answers(&statistics.answers), width);
+        list(&mut text, &heading(statistics), &answers(statistics), width);
         if length == Length::Full {
             list(&mut text, "What can be concluded", &statistics.conclusions, width);
         }
         let design = format!("{}.", statistics.design_note);
         let is_new = |warning: &&String| **warning != design && !statistics.pooled.contains(warning);
         let warnings: Vec<String> = statistics.warnings.iter().filter(is_new).cloned().collect();
+        let most = if length == Length::Full { usize::MAX } else { MOST_RANKED };
+        let tied = tables::tied(statistics, &shown, most).into_iter();
+        // One screen has the ranks under the first metric.
+        let count = if length == Length::Screen { 1 } else { usize::MAX };
+        tied.take(count).for_each(|table| section(&mut text, table, width));
         list(&mut text, "What cannot be concluded", &warnings, width);
-        for (title, table) in sections(statistics, &shown, length, &percent) {
-            section(&mut text, title, table, width);
-        }
-        if length == Length::Short {
-            text.push('\n');
-            push_wrapped(
-                &mut text,
-                "--full prints every interval, plain means, clusters, and what could have been shown.",
-                width,
-                0,
-            );
-        }
+        let tables = if length == Length::Screen { Vec::new() } else { sections(statistics, &shown, length, &percent) };
+        tables.into_iter().for_each(|(title, table)| section(&mut text, table.titled(title), width));
+        let more = match length {
+            Length::Screen => "--tables prints the numbers behind the answers; --full also every row and interval.",
+            Length::Tables => {
+                "--full prints every row and interval, plain means, clusters, and what could have been shown."
+            }
+            Length::Full => return text,
+        };
+        text.push('\n');
+        push_wrapped(&mut text, more, width, 0);
         text
     }
 }
@@ -71,13 +83,24 @@ impl DesignAudit {
     }
 }
 
-fn answers(answers: &[Answer]) -> Vec<String> {
+/// The answers, each with its caveats. Long findings of the audit, which is above, are named by their numbers.
+fn answers(statistics: &Statistics) -> Vec<String> {
+    let findings = &statistics.audit.findings;
     let line = |answer: &Answer| {
-        let caveats = answer.caveats.join("; ");
+        let number = |caveat: &str| findings.iter().position(|it| it.finding == caveat).map(|at| at + 1);
+        let is_long = answer.caveats.iter().map(String::len).sum::<usize>() > MOST_REPEATED;
+        let numbers: Vec<String> =
+            answer.caveats.iter().filter_map(|it| number(it)).map(|number| format!("[{number}]")).collect();
+        let mut caveats: Vec<String> =
+            answer.caveats.iter().filter(|it| !is_long || number(it).is_none()).cloned().collect();
+        if is_long && !numbers.is_empty() {
+            caveats.push(format!("design audit {}", numbers.join(" ")));
+        }
+        let caveats = caveats.join("; ");
         let caveats = if caveats.is_empty() { caveats } else { format!(" ({caveats})") };
         format!("{} {}: {}{caveats}.", answer.question, answer.metric, answer.answer)
     };
-    answers.iter().map(line).collect()
+    statistics.answers.iter().map(line).collect()
 }
 
 /// The filter that chose the episodes, and the settings that they pool.
@@ -96,7 +119,8 @@ fn audit(text: &mut String, audit: &DesignAudit, width: Option<usize>) {
             0,
         );
     }
-    list(text, "Design audit", &audit.sentences(), width);
+    let numbered = (1..).zip(audit.sentences()).map(|(number, sentence)| format!("[{number}] {sentence}"));
+    list(text, "Design audit", &numbered.collect::<Vec<_>>(), width);
 }
 
 fn departures(text: &mut String, found: Option<&[String]>, width: Option<usize>) {
@@ -159,9 +183,6 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
     if !is_full {
         return sections;
     }
-    let title = "Ranks that the tests leave open: one more than the models shown to be better, to all but those shown to be \
-                 worse";
-    add(title.to_owned(), tables::ranks(statistics, shown));
     let title = format!(
         "How often one model decides earlier than another, averaged over experiments; who never decides is the latest; \
          stratified bootstrap, {percent} percentile intervals"
@@ -187,11 +208,10 @@ fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usiz
     }
 }
 
-fn section(text: &mut String, title: impl Into<String>, table: Table, width: Option<usize>) {
+fn section(text: &mut String, mut table: Table, width: Option<usize>) {
     if table.is_empty() {
         return;
     }
-    let mut table = table.titled(title);
     if table.rows().flatten().any(|cell| cell.text.contains(tables::FEW_MARK)) {
         table.sentences.push(format!("{} fewer than {FEW} defined episodes: not to be compared.", tables::FEW_MARK));
     }

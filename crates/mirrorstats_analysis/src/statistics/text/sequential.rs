@@ -46,7 +46,7 @@ impl Sequential {
                 separated(&pairs),
             ),
         ] {
-            section(&mut text, title, table, width);
+            section(&mut text, table.titled(title), width);
         }
         let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated).count();
         let apart = sequential.not_comparable.iter();

@@ -1,11 +1,13 @@
 //! The tables of `stats`, one function each: one line per row of the statistics whose metric is shown.
 
+use indexmap::{IndexMap, IndexSet};
+
 use super::text_table::TextTable;
 use crate::statistics::comparisons::matching::singular;
 use crate::statistics::rates::ranks::ALL;
 use crate::statistics::{
-    CellRow, Comparison, DesignAudit, Dose, Intervals, LossCases, Method, OverallMethod, Sign, Statistics, Units,
-    Verdict,
+    CellRow, ChanceRow, Comparison, DesignAudit, Dose, Intervals, LossCases, Method, OverallMethod, RankRow, Sign,
+    Statistics, Units, Verdict,
 };
 use crate::study::named;
 use mirrorstats_exact::chance::with_strategy;
@@ -82,11 +84,28 @@ fn mark(cell: &CellRow) -> String {
     if cell.few { FEW_MARK.to_string() } else { String::new() }
 }
 
-/// Rates against their levels; a rate is shown with the same rate among finished episodes.
+/// Rates against their levels; a rate is shown with the same rate among finished episodes. Unless `is_full`, without
+/// rows that repeat others: a lower level of the same role, the same count among finished episodes, and families
+/// without any verdict, which the answers name.
 pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
     let has_losses = statistics.chance.iter().any(|row| row.losses.is_some());
-    TextTable::of(statistics.chance.iter().filter(|row| is_shown(&row.metric)))
+    let is_new = |row: &ChanceRow| {
+        let whole = statistics.relations.whole(&row.metric);
+        let is_other = |other: &ChanceRow| {
+            let is_alike = (&other.key, other.role) == (&row.key, row.role);
+            let is_higher = other.metric == row.metric && other.level.value() > row.level.value();
+            let is_same = Some(&*other.metric) == whole
+                && (other.successes, other.n, other.verdict) == (row.successes, row.n, row.verdict);
+            is_alike && (is_higher || is_same)
+        };
+        let is_of_family = |other: &&ChanceRow| {
+            (&other.key.experiment, &other.metric, other.level) == (&row.key.experiment, &row.metric, row.level)
+        };
+        let is_said = |row: &ChanceRow| row.unsaid(statistics.confidence).is_none();
+        !statistics.chance.iter().any(is_other) && statistics.chance.iter().filter(is_of_family).any(is_said)
+    };
+    TextTable::of(statistics.chance.iter().filter(|row| is_shown(&row.metric) && (is_full || is_new(row))))
         .cell(|row| (&row.key, &row.metric))
         .text("level", |row| format!("{} {}", row.role.name(), with_strategy(row.level, row.strategy.as_deref())))
         .number("count", |row| {
@@ -128,14 +147,18 @@ impl<R> TextTable<R> {
     ) -> Self {
         let has_losses = all.clone().any(|found| found.losses.is_some());
         let has_repeats = all.clone().any(|found| found.repeat_se.is_some());
-        let is_permuted = is_full && all.any(|found| found.p_error.is_some());
+        let is_permuted = is_full && all.clone().any(|found| found.p_error.is_some());
+        let has_margin = all.clone().any(|found| found.equivalence.is_some());
+        let has_simultaneous = is_full && all.any(|found| found.simultaneous.is_some());
         let places = |row: &R| method(of(row).method).1;
         self.text("test", |row| method(of(row).method).0)
             .number("counts", |row| counts(of(row)))
             .number("difference", |row| fixed(of(row).difference, places(row)))
             .number("interval", |row| held(of(row).interval, of(row).withheld, places(row)))
+            .number_if(has_simultaneous, "simultaneous", |row| plain(of(row).simultaneous, places(row)))
             .number_if(has_repeats, "SE of repeats", |row| fixed(of(row).repeat_se, places(row)))
             .p_values(is_full, |row| [of(row).p, of(row).mid_p, of(row).p_adjusted])
+            .number_if(has_margin, "p within margin", |row| p_value(of(row).equivalence.map(|it| it.p_adjusted)))
             .number_if(is_permuted, "Monte Carlo error of p", |row| fixed(of(row).p_error, 4))
             .lost_if(has_losses, |row| of(row).losses.as_ref())
     }
@@ -276,13 +299,34 @@ pub(super) fn design(audit: &DesignAudit) -> Table {
         .table()
 }
 
-pub(super) fn ranks(statistics: &Statistics, shown: Shown) -> Table {
-    TextTable::of(statistics.ranks.iter().filter(|row| shown(&row.metric)))
-        .text("experiment", |row| row.experiment.clone().unwrap_or_else(|| ALL.to_owned()))
-        .text("metric", |row| row.metric.clone())
-        .text("model", |row| row.model.clone())
-        .number("ranks", |row| row.interval())
-        .table()
+/// The ranks that the tests leave open, a table per metric: models by experiments, the best first.
+pub(super) fn tied(statistics: &Statistics, shown: Shown, most: usize) -> Vec<Table> {
+    let metrics: IndexSet<&str> = statistics.ranks.iter().map(|row| &*row.metric).filter(|it| shown(it)).collect();
+    metrics.into_iter().map(|metric| tied_under(statistics, metric, most)).collect()
+}
+
+fn tied_under(statistics: &Statistics, metric: &str, most: usize) -> Table {
+    let mut ranks: IndexMap<&str, IndexMap<&str, &RankRow>> = IndexMap::new();
+    for row in statistics.ranks.iter().filter(|row| row.metric == metric) {
+        ranks.entry(&row.model).or_default().insert(row.experiment.as_deref().unwrap_or(ALL), row);
+    }
+    let columns: IndexSet<&str> = ranks.values().flat_map(|row| row.keys().copied()).collect();
+    // By the mean of all ranks; the sort is stable.
+    let place = |row: &IndexMap<&str, &RankRow>| {
+        let sum: usize = row.values().map(|row| row.best + row.worst).sum();
+        sum as f64 / row.len() as f64
+    };
+    ranks.sort_by(|_, a, _, b| place(a).total_cmp(&place(b)));
+    let title = format!("Ranks that the tests leave open, {metric}: models that may have rank 1 are tied for the best");
+    let mut table = Table::plain(&["model"], &Vec::from_iter(columns.iter().copied())).titled(title);
+    for (model, row) in ranks.iter().take(most) {
+        let cells = columns.iter().map(|at| row.get(at).map_or_else(|| UNDEFINED.to_owned(), |row| row.interval()));
+        table.push([(*model).to_owned()].into_iter().chain(cells));
+    }
+    if let Some(more) = ranks.len().checked_sub(most).filter(|more| *more > 0) {
+        table.sentences.push(format!("{} more.", counted(more as u64, "model")));
+    }
+    table
 }
 
 pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Table {

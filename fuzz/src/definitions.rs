@@ -37,6 +37,10 @@ pub fn target(data: &[u8]) {
     for output in &definitions.plan.outputs {
         assert!(definitions.explain(&output.name).is_some(), "{} is not explained", output.name);
     }
+    // Columns that the text declares are those of the traces when a catalog is restored.
+    if definitions.declared_columns().next().is_some() {
+        return;
+    }
     let restored = Definitions::of_catalog(&definitions.catalog, &COLUMNS).expect("a catalog is its definitions");
     assert_eq!(restored.catalog, definitions.catalog);
     values(&definitions, &restored);

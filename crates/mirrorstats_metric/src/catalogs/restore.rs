@@ -111,6 +111,11 @@ mod tests {
     fn the_built_in_definitions_come_back_as_they_were() {
         for name in built_in_names() {
             let definitions = Definitions::load(name, &columns()).unwrap();
+            // In another domain the traces give the columns.
+            if definitions.catalog.domain.is_some() {
+                assert!(Definitions::of_catalog(&definitions.catalog, &columns()).is_err(), "{name}");
+                continue;
+            }
             let back = Definitions::of_catalog(&definitions.catalog, &columns()).unwrap();
             assert_eq!(back.catalog, definitions.catalog);
             assert_eq!(back.plan.outputs.len(), definitions.plan.outputs.len());

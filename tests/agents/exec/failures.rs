@@ -244,8 +244,9 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     let bench = Bench::new();
     // An episode fails at its first step if the last task in `heard.jsonl` is that of one of these runs.
     let fails = |runs: &[u64]| {
-        let seeds: String = runs.iter().map(|run| format!(" -e '{}'", seed_of(1, *run))).collect();
-        let task = format!("grep '\"kind\":\"task\"' heard.jsonl | tail -n 1 | grep -q{seeds} && exit 7");
+        let seeds: Vec<String> = runs.iter().map(|run| format!("-e '{}'", seed_of(1, *run))).collect();
+        let seeds = seeds.join(" ");
+        let task = format!("grep '\"kind\":\"task\"' heard.jsonl | tail -n 1 | grep -q {seeds} && exit 7");
         format!("case \"$line\" in *'\"t\":1,'*) {task} ;; esac; {}", three_steps())
     };
     bench.program(&fails(&[2, 4]));

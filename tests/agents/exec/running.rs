@@ -21,9 +21,9 @@ fn record(bench: &Bench) -> Command {
 fn a_complete_experiment_appears_before_the_others() {
     let bench = Bench::new();
     // The second episode of E1 is lost. E2 waits for the file `go`.
-    let [lost, slow, last] = [(1, 2), (2, 1), (2, 2)].map(|(experiment, run)| seed_of(experiment, run));
+    let [gone, third, fourth] = [(1, 2), (2, 1), (2, 2)].map(|(experiment, run)| seed_of(experiment, run));
     let lost = format!(
-        "case \"$line\" in *'{lost}'*) exit 3 ;; *'{slow}'*|*'{last}'*) while ! [ -e go ]; do sleep 0.02; done ;; esac"
+        "case \"$line\" in *'{gone}'*) exit 3 ;; *'{third}'*|*'{fourth}'*) while ! [ -e go ]; do sleep 0.02; done ;; esac"
     );
     bench.program(&three_steps());
     let script = fs::read_to_string(bench.path("program.sh")).unwrap();

@@ -14,6 +14,7 @@ const ALL: &str = "all";
 
 /// Intervals, tests and comparisons that hold at small n
 #[derive(Clone, Debug, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an option of the command line")]
 pub struct StatsArgs {
     #[command(flatten)]
     pub traces: TraceArgs,

@@ -60,7 +60,9 @@ impl Statistics {
         tied.take(count).for_each(|table| section(&mut text, table, width));
         list(&mut text, "What cannot be concluded", &warnings, width);
         let tables = if length == Length::Screen { Vec::new() } else { sections(statistics, &shown, length, &percent) };
-        tables.into_iter().for_each(|(title, table)| section(&mut text, table.titled(title), width));
+        for (title, table) in tables {
+            section(&mut text, table.titled(title), width);
+        }
         let more = match length {
             Length::Screen => "--tables prints the numbers behind the answers; --full also every row and interval.",
             Length::Tables => {

@@ -318,7 +318,7 @@ fn tied_under(statistics: &Statistics, metric: &str, most: usize) -> Table {
     };
     ranks.sort_by(|_, a, _, b| place(a).total_cmp(&place(b)));
     let title = format!("Ranks that the tests leave open, {metric}: models that may have rank 1 are tied for the best");
-    let mut table = Table::plain(&["model"], &Vec::from_iter(columns.iter().copied())).titled(title);
+    let mut table = Table::plain(&["model"], &columns.iter().copied().collect::<Vec<_>>()).titled(title);
     for (model, row) in ranks.iter().take(most) {
         let cells = columns.iter().map(|at| row.get(at).map_or_else(|| UNDEFINED.to_owned(), |row| row.interval()));
         table.push([(*model).to_owned()].into_iter().chain(cells));

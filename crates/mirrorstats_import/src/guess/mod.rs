@@ -2,24 +2,24 @@
 //!
 //! Rule: a draft is text for a person to read. Each choice says which values made it, and what is not chosen is said.
 
+mod rows;
+
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
-use arrow::array::{Array, ArrayRef, AsArray as _};
 use indexmap::IndexMap;
 use mirrorstats_exact::format::counted;
 use mirrorstats_trace::schema::domain::is_general;
 use mirrorstats_trace::schema::{Kind, column};
-use serde_json::Value;
 
-use super::arrays::plain;
 use super::error::{Fault, ImportError};
 use super::format::Format;
 use super::mapping::{Mapping, Notes};
 use super::spelling;
 use super::text::Text;
 use super::value::Cell;
+use rows::{Rows, names_of};
 
 /// A draft of one file for `--from` and `--definitions`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,27 +106,16 @@ const HIGHER: [&str; 5] = ["reward", "return", "score", "progress", "success"];
 const SUMMED: [&str; 6] = ["reward", "cost", "token", "latency", "duration", "price"];
 const UNITS: [(&str, &str); 5] = [("_s", "s"), ("_ms", "ms"), ("_m", "m"), ("_usd", "USD"), ("_n", "N")];
 
-/// The values of the rows of a file, by the paths of mappings.
-#[derive(Debug, Default)]
-struct Rows {
-    /// The list that holds the rows, as in `rows = "steps[]"`.
-    list: String,
-    columns: IndexMap<String, Vec<Cell<'static>>>,
-    count: usize,
-    is_cut: bool,
-}
-
 /// Drafts how this file is read and scored. Errors: a file that cannot be read, or that has no rows.
 pub fn guess(path: &Path) -> Result<Draft, ImportError> {
     let mut text = Text::open(path)?;
     let (own_format, values) = text.sample(MOST_ROWS)?;
     let is_object = values.as_ref().is_some_and(|values| values.len() == 1);
-    let rows = match values {
-        Some(values) => Rows::of_values(&values),
-        None => {
-            text.read(&Mapping::default(), None, &mut Notes::default())?;
-            Rows::of_tables(&text)?
-        }
+    let rows = if let Some(values) = values {
+        Rows::of_values(&values)
+    } else {
+        text.read(&Mapping::default(), None, &mut Notes::default())?;
+        Rows::of_tables(&text)?
     };
     if rows.count == 0 {
         let help = "name a file with rows, or write the mapping by hand: docs/how-to/domains.md";
@@ -144,140 +133,6 @@ pub fn guess(path: &Path) -> Result<Draft, ImportError> {
     let format = own_format.or_else(|| is_json.then_some(Format::Json));
     let is_mapped = own_format.is_some();
     Ok(Drafting { rows, format, is_mapped, stem: identifier(stem), reasons: Vec::new() }.draft())
-}
-
-impl Rows {
-    fn of_values(values: &[Value]) -> Self {
-        let list = longest_list(values).unwrap_or_default();
-        let mut rows = Self { list, ..Self::default() };
-        for value in values {
-            let parts: Vec<&str> = rows.list.split("[]").map(|part| part.trim_start_matches('.')).collect();
-            let parts: Vec<String> = parts[..parts.len() - 1].iter().map(|part| (*part).to_owned()).collect();
-            rows.add(value, &parts, &IndexMap::new());
-        }
-        rows.fill();
-        rows
-    }
-
-    fn add(&mut self, value: &Value, lists: &[String], around: &IndexMap<String, Cell<'static>>) {
-        let mut values = around.clone();
-        flatten("", value, lists.first().map(String::as_str), &mut values);
-        let Some((list, inner)) = lists.split_first() else {
-            return self.push(values);
-        };
-        for item in super::mapping::at(value, list).and_then(Value::as_array).into_iter().flatten() {
-            self.add(item, inner, &values);
-        }
-    }
-
-    fn push(&mut self, values: IndexMap<String, Cell<'static>>) {
-        if self.count == MOST_ROWS {
-            self.is_cut = true;
-            return;
-        }
-        for (path, value) in values {
-            let column = self.columns.entry(path).or_default();
-            column.resize(self.count, Cell::Null);
-            column.push(value);
-        }
-        self.count += 1;
-    }
-
-    fn fill(&mut self) {
-        self.columns.values_mut().for_each(|column| column.resize(self.count, Cell::Null));
-    }
-
-    fn of_tables(text: &Text) -> Result<Self, ImportError> {
-        let mut rows = Self::default();
-        for batch in 0..text.batches() {
-            if rows.count >= MOST_ROWS {
-                rows.is_cut = true;
-                break;
-            }
-            let table = text.batch(batch)?;
-            for (field, values) in table.schema().fields().iter().zip(table.columns()) {
-                rows.add_column(field.name(), values);
-            }
-            rows.count += table.num_rows();
-            rows.fill();
-        }
-        Ok(rows)
-    }
-
-    fn add_column(&mut self, path: &str, values: &ArrayRef) {
-        if let Some(members) = values.as_struct_opt() {
-            for (name, values) in members.column_names().into_iter().zip(members.columns()) {
-                self.add_column(&format!("{path}.{name}"), values);
-            }
-        } else if let Ok(values) = plain(values) {
-            let count = self.count;
-            let column = self.columns.entry(path.to_owned()).or_default();
-            column.resize(count, Cell::Null);
-            column.extend((0..values.len()).map(|row| Cell::at(&values, row).into_owned()));
-        }
-    }
-
-    /// The path with the first of these names that a fit column has.
-    fn named(&self, names: &[&str], fits: impl Fn(&[Cell<'_>]) -> bool) -> Option<&str> {
-        let of_name = |name: &&str| {
-            self.columns.iter().find(|(path, values)| names_of(path).contains(&(*name).to_owned()) && fits(values))
-        };
-        names.iter().find_map(of_name).map(|(path, _)| path.as_str())
-    }
-
-    /// The texts of these columns in each row.
-    fn keys(&self, paths: &[String]) -> Vec<Vec<String>> {
-        let text = |path: &String, row: usize| self.columns[path][row].text().unwrap_or_default().into_owned();
-        (0..self.count).map(|row| paths.iter().map(|path| text(path, row)).collect()).collect()
-    }
-}
-
-/// The plain values of an object by their paths; those of the list `without` are rows.
-fn flatten(path: &str, value: &Value, without: Option<&str>, values: &mut IndexMap<String, Cell<'static>>) {
-    let Value::Object(members) = value else {
-        values.insert(path.to_owned(), Cell::of_json(value).into_owned());
-        return;
-    };
-    for (name, member) in members {
-        let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
-        if without != Some(&*path) {
-            flatten(&path, member, without, values);
-        }
-    }
-}
-
-/// The list of objects with the most items, such as `tasks[].episodes[]`; `None` if the objects themselves are the rows.
-fn longest_list(values: &[Value]) -> Option<String> {
-    let mut counts: IndexMap<String, usize> = IndexMap::new();
-    values.iter().for_each(|value| count_lists("", value, &mut counts));
-    let longest = counts.into_iter().rev().max_by_key(|(_, count)| *count)?;
-    // Each line may have a few items of something, and still be the row.
-    (values.len() == 1 || longest.1 > 3 * values.len()).then_some(longest.0)
-}
-
-fn count_lists(path: &str, value: &Value, counts: &mut IndexMap<String, usize>) {
-    match value {
-        Value::Object(members) => {
-            for (name, member) in members {
-                let dot = if path.is_empty() || path.ends_with('.') { "" } else { "." };
-                count_lists(&format!("{path}{dot}{name}"), member, counts);
-            }
-        }
-        Value::Array(items) if items.first().is_some_and(Value::is_object) => {
-            let list = format!("{path}[]");
-            *counts.entry(list.clone()).or_default() += items.len();
-            items.iter().for_each(|item| count_lists(&format!("{list}."), item, counts));
-        }
-        _ => {}
-    }
-}
-
-/// The names that a path may mean: its last part, and the last two, in small letters and digits alone.
-fn names_of(path: &str) -> [String; 2] {
-    let small = |text: &str| text.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
-    let mut parts = path.rsplit('.');
-    let last = parts.next().unwrap_or_default();
-    [small(last), small(parts.next().unwrap_or_default()) + &small(last)]
 }
 
 fn identifier(text: &str) -> String {
@@ -342,9 +197,9 @@ impl Drafting {
         let parts: Vec<String> = [&model, &experiment, &seed, &run].into_iter().flatten().cloned().collect();
         // An id of the file is enough if everything else is constant in its episodes.
         let is_enough = |id: &String| {
-            let mut seen: HashMap<String, Vec<String>> = HashMap::new();
+            let mut by_id: HashMap<String, Vec<String>> = HashMap::new();
             let ids = rows.keys(std::slice::from_ref(id)).into_iter().map(|mut key| key.remove(0));
-            ids.zip(rows.keys(&parts)).all(|(id, others)| *seen.entry(id).or_insert_with(|| others.clone()) == others)
+            ids.zip(rows.keys(&parts)).all(|(id, others)| *by_id.entry(id).or_insert_with(|| others.clone()) == others)
         };
         let mut id: Vec<String> = match own_id {
             Some(own) if is_enough(&own) => vec![own],
@@ -483,7 +338,7 @@ impl Drafting {
             self.reasons.push(format!("texts without an entry are left out: {}", left.join(", ")));
         }
         tables.push_str(&columns);
-        metrics.iter().for_each(|metric| tables.push_str(metric));
+        tables.push_str(&metrics.concat());
     }
 }
 

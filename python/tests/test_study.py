@@ -192,7 +192,8 @@ def test_answers_equal_those_of_the_command_line(paper, command):
     words = [paper, "--where", "experiment = 'E1'"]
     assert study.stats() == json.loads(command("stats", *words, "--json").stdout)
     # The text names arguments where the command line has options.
-    assert str(study.stats()) == command("stats", *words).stdout.replace("--full", "`full=True`")
+    printed = command("stats", *words).stdout
+    assert str(study.stats()) == printed.replace("--tables", "`tables`").replace("--full", "`full=True`")
     episode = "E1/gpt-5-1/s1/r2"
     assert study.explain(episode) == json.loads(command("score", paper, "--explain", episode, "--json").stdout)
     assert str(study.explain(episode)).strip() == command("score", paper, "--explain", episode).stdout.strip()

@@ -74,6 +74,20 @@ fn words_for_success_become_truth_values_and_other_words_do_not() {
 }
 
 #[test]
+fn columns_with_one_name_get_different_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let line = r#"{"model": "a", "task": "x", "run": 1, "a": {"force": 1}, "force": 2, "b": {"force": 3}, "steps": 4}"#;
+    fs::write(at.join("twice.jsonl"), line).unwrap();
+    let (text, _) = draft(at, "twice.jsonl");
+    let scores = run(at, &["score", "twice.jsonl", "--definitions", "draft.toml"]).done();
+    assert!(
+        ["1", "2", "3", "4"].iter().all(|value| scores.lines().nth(1).unwrap().split(',').any(|cell| cell == *value)),
+        "{text}{scores}"
+    );
+}
+
+#[test]
 fn rows_in_lists_of_one_object_are_found() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -272,6 +272,8 @@ impl Drafting {
             metrics.push(metric("STEPS", "Steps", "length()", Some("lower")));
         }
         let mut has_success = false;
+        // In capitals, as metrics are; `STEPS` is one already.
+        let mut used = HashSet::from(["STEPS".to_owned()]);
         for (path, values) in &self.rows.columns {
             if taken.contains(path) {
                 continue;
@@ -282,6 +284,9 @@ impl Drafting {
             let mut name = identifier(path.rsplit('.').next().unwrap_or(path));
             if entries.contains_key(&name) || column(&name).is_some_and(|column| is_general(column.name)) {
                 name = identifier(path);
+            }
+            while used.contains(&name.to_ascii_uppercase()) {
+                name.push_str("_2");
             }
             let is_success = !has_success && [&last, &whole].iter().any(|name| SUCCESS.contains(&name.as_str()));
             let words = words(values).filter(|_| is_success && found == Kind::String);
@@ -307,6 +312,7 @@ impl Drafting {
                 let _ = writeln!(columns, "unit = {}", quoted(unit));
             }
             has_success |= is_success;
+            used.insert(name.to_ascii_uppercase());
             let title = title(&name, unit.map(|(ending, _)| *ending));
             let upper = name.to_ascii_uppercase();
             let goes = |names: &[&str]| names.iter().any(|part| last.contains(part));

@@ -13,7 +13,7 @@ _OPTION = (
 _COMMAND = r"(`mirrorstats [^`]*`)"
 # The folder of definitions, styles and frames without a file.
 _SPOOLED = r"(?:[^\s`]*/)?mirrorstats-[a-z0-9_]{8}/"
-_FLAGS = {"full", "keep_going", "no_frames", "no_log", "pool"}
+_FLAGS = {"full", "keep_going", "no_frames", "no_log", "pool", "tables"}
 
 
 def in_python(words: str) -> str:
@@ -118,6 +118,12 @@ def check_share(name: str, value: Any) -> None:
     """Accepts numbers strictly between 0 and 1."""
     if not is_number(value) or not 0 < value < 1:
         raise ArgumentError(f"{name}: expected a number between 0 and 1 such as 0.95, found {value!r}")
+
+
+def check_margin(value: Any) -> None:
+    """Accepts numbers above 0."""
+    if not is_number(value) or not 0 < value < float("inf"):
+        raise ArgumentError(f"margin: expected a number above 0 such as 0.1, found {value!r}")
 
 
 def check_name(name: str, value: Any, known: tuple[str, ...]) -> None:

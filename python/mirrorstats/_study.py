@@ -8,7 +8,7 @@ from typing import Any, Literal, Optional, Union
 
 from . import _native
 from ._answer import Changes, Explanation, Gate, Manifest, Statistics
-from ._error import ArgumentError, InputError, check_name, check_number, check_share, check_type, is_number
+from ._error import ArgumentError, InputError, check_margin, check_name, check_number, check_share, check_type
 from ._import import lines, trace_of
 from ._native import ArrowSteps, ArrowTable, Figure, Table
 from ._paths import Definitions, Path, Spool, Style, is_frame, several, text, toml_file
@@ -141,8 +141,7 @@ def gate(
     _check_study("base", base)
     _check_study("new", new)
     check_share("confidence", confidence)
-    if not is_number(margin) or not 0 < margin < float("inf"):
-        raise ArgumentError(f"margin: expected a number above 0 such as 0.1, found {margin!r}")
+    check_margin(margin)
     return Gate(new._native.gate(base._native, metric, margin, confidence))
 
 
@@ -311,15 +310,25 @@ class Study:
         """
         return Manifest(self._native.report(text(out, self._spool), self._style(style), figures))
 
-    def stats(self, *, confidence: float = 0.95, full: bool = False) -> Statistics:
+    def stats(
+        self,
+        *,
+        confidence: float = 0.95,
+        margin: Optional[float] = None,
+        tables: bool = False,
+        full: bool = False,
+    ) -> Statistics:
         """Intervals, tests and comparisons of the cells, as `mirrorstats stats --json`; `Statistics` has them as frames too.
 
         Args:
             confidence: of every interval, between 0 and 1; tests are at one minus it.
-            full: whether the text has every test, not the answers alone.
+            margin: the largest difference that counts as none; of rates below 1, of durations from 1 on. Answers then name
+                what is shown to be within it.
+            tables: whether the text has the numbers behind the answers.
+            full: whether the text has every row and interval.
 
         Raises:
-            ArgumentError: a confidence that is not between 0 and 1.
+            ArgumentError: a confidence that is not between 0 and 1, or a margin of 0 or less.
 
         Example:
             >>> import mirrorstats as ms
@@ -328,7 +337,9 @@ class Study:
             (168, 0.9)
         """
         check_share("confidence", confidence)
-        return Statistics(self._native.stats(confidence, full))
+        if margin is not None:
+            check_margin(margin)
+        return Statistics(self._native.stats(confidence, margin, tables, full))
 
     def diff(self, other: Study) -> Changes:
         """What changes from this study to another one: cells, and values of episodes, as `mirrorstats diff --json`.

@@ -149,14 +149,26 @@ impl Study {
         answer::of(&written.manifest, [written.files, notes].concat().join("\n"))
     }
 
-    #[pyo3(signature = (confidence, full))]
-    fn stats(&self, py: Python<'_>, confidence: f64, full: bool) -> PyResult<Answer> {
-        let options = StatisticsOptions { confidence, improvements: true, ..StatisticsOptions::default() };
+    #[pyo3(signature = (confidence, margin, tables, full))]
+    fn stats(
+        &self,
+        py: Python<'_>,
+        confidence: f64,
+        margin: Option<f64>,
+        tables: bool,
+        full: bool,
+    ) -> PyResult<Answer> {
+        let options = StatisticsOptions { confidence, margin, improvements: true, ..StatisticsOptions::default() };
+        let length = match (full, tables) {
+            (true, _) => Length::Full,
+            (_, true) => Length::Tables,
+            _ => Length::Screen,
+        };
         let found = py.detach(|| {
             let grouped = self.inner.grouped().map_err(error::of_study)?;
             mirrorstats::statistics(&grouped, &options).map_err(error::of_study)
         })?;
-        answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Screen }, None))
+        answer::of(&found, found.render(&found.headline, length, None))
     }
 
     fn query(&self, py: Python<'_>, sql: &str) -> PyResult<Table> {

@@ -207,9 +207,16 @@ def test_errors_have_specific_types_and_name_arguments(paper, tmp_path):
         assert isinstance(raised.value, ms.Error) and "--" not in str(raised.value).replace("-->", "")
     assert "`full=True`" in str(study.stats()) or "--full" not in str(study.stats())
     steps = tmp_path / "steps.csv"
-    pandas.DataFrame(random_rows(7)).to_csv(steps, index=False)
-    with pytest.raises(ms.InputError, match="found steps .a column `t` exists."):
+    pandas.DataFrame({"a": [1, 2], "b": [3, 4]}).to_csv(steps, index=False)
+    with pytest.raises(ms.InputError, match="`episode_id`"):
         ms.open(steps).cells
+
+
+def test_a_log_is_opened_where_a_trace_is(tmp_path):
+    rows, steps = random_rows(7), tmp_path / "steps.csv"
+    pandas.DataFrame(rows).to_csv(steps, index=False)
+    trace = ms.import_steps(rows, tmp_path / "steps.parquet")["out"]
+    assert ms.open(steps).cells.to_polars().equals(ms.open(trace).cells.to_polars())
 
 
 def test_an_exception_of_an_agent_keeps_its_traceback(tmp_path):

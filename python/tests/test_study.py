@@ -193,13 +193,18 @@ def test_answers_equal_those_of_the_command_line(paper, command):
     assert study.stats() == json.loads(command("stats", *words, "--json").stdout)
     # The text names arguments where the command line has options.
     printed = command("stats", *words).stdout
-    assert str(study.stats()) == printed.replace("--tables", "`tables`").replace("--full", "`full=True`")
+    assert str(study.stats()) == printed.replace("--tables", "`tables=True`").replace("--full", "`full=True`")
     episode = "E1/gpt-5-1/s1/r2"
     assert study.explain(episode) == json.loads(command("score", paper, "--explain", episode, "--json").stdout)
     assert str(study.explain(episode)).strip() == command("score", paper, "--explain", episode).stdout.strip()
     assert ms.validate(paper) == json.loads(command("trace", "validate", paper, "--json").stdout)
     assert str(ms.validate(paper)) == command("trace", "validate", paper).stdout
-    shown = study.stats()._repr_html_()
+    tables = study.stats(margin=0.2, tables=True)
+    printed = command("stats", *words, "--tables", "--margin", "0.2").stdout
+    assert str(tables) == printed.replace("--full", "`full=True`")
+    with pytest.raises(ms.ArgumentError, match="margin: expected a number above 0"):
+        study.stats(margin=0)
+    shown = tables._repr_html_()
     assert shown.startswith("<pre style=") and "overflow-x" in shown and "&lt;0.0001" in shown and "<0.0001" not in shown
 
 

@@ -56,7 +56,7 @@ pub struct ImportAsked {
 #[pyfunction]
 pub fn import_text(py: Python<'_>, name: &str, lines: &[u8], asked: ImportAsked) -> PyResult<Answer> {
     let ImportAsked { out, definitions, palette, clusters_by_seed, reconstruction } = asked;
-    let request = ImportRequest { out, definitions, palette, clusters_by_seed, reconstruction };
+    let request = ImportRequest { out, definitions: Some(definitions), palette, clusters_by_seed, reconstruction };
     let imported = py.detach(|| {
         let text = Text::spool(name, lines).map_err(error::of_input)?;
         import(vec![text], &request).map_err(error::of_study)

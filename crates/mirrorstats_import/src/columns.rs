@@ -3,6 +3,8 @@
 //!
 //! Rule: a value is taken unchanged or refused: texts never become numbers, and numbers stay equal.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use arrow::array::{Array as _, ArrayRef, RecordBatch};
 use indexmap::IndexMap;
 
@@ -29,6 +31,8 @@ pub(super) struct Columns {
     own: IndexMap<String, Inferred>,
     /// True if attributions are read from texts.
     pub(super) is_derived: bool,
+    /// The columns that mappings declare absent, by experiment.
+    pub(super) absent: BTreeMap<String, BTreeSet<String>>,
 }
 
 #[derive(Debug, Default)]
@@ -99,10 +103,11 @@ impl Columns {
         &mut self,
         rows: &RecordBatch,
         place: &dyn Fn(usize) -> Location,
-        order: Order,
+        (order, absent): (Order, &[String]),
         limits: Limits<'_>,
     ) -> Vec<(usize, Fault)> {
         let mut faults = Vec::new();
+        self.declare_absent(rows, absent);
         for (field, values) in rows.schema_ref().fields().iter().zip(rows.columns()) {
             let (key, known) = (field.name(), limits.expected.domain.column(field.name()));
             if let Some(column) = known.filter(|column| !self.known.contains(&column.name)) {
@@ -116,11 +121,20 @@ impl Columns {
         }
         let domain = limits.expected.domain;
         let has = |column: &Column| rows.column_by_name(column.name).is_some();
-        for column in COLUMNS.iter().filter(|column| column.required && domain.has(column) && !has(column)) {
+        let is_absent = |column: &Column| absent.iter().any(|name| name == column.name);
+        let is_missing = |column: &&Column| column.required && domain.has(column) && !has(column) && !is_absent(column);
+        for column in COLUMNS.iter().filter(is_missing) {
             let fault = missing(column, rows, limits);
             faults.extend((0..rows.num_rows()).map(|row| (row, fault.clone())));
         }
         faults
+    }
+
+    fn declare_absent(&mut self, rows: &RecordBatch, absent: &[String]) {
+        let Some(experiments) = rows.column_by_name("experiment").filter(|_| !absent.is_empty()) else { return };
+        for name in (0..rows.num_rows()).filter_map(|row| Some(Cell::at(experiments, row).text()?.into_owned())) {
+            self.absent.entry(name).or_default().extend(absent.iter().cloned());
+        }
     }
 
     pub(super) fn faults(&self) -> Vec<Fault> {

@@ -76,7 +76,8 @@ impl From<Fault> for ImportError {
 }
 
 fn listed(faults: &[Fault], more: usize) -> String {
-    let lacks = |column: &str| faults.iter().any(|fault| fault.key.as_deref() == Some(column) && fault.found == "none");
+    let is_missing = |fault: &Fault| fault.found == "none" || fault.found.starts_with("none, though");
+    let lacks = |column: &str| faults.iter().any(|fault| fault.key.as_deref() == Some(column) && is_missing(fault));
     let is_other = OF_MIRRORS.into_iter().all(lacks);
     let is_nested = faults.iter().any(|fault| fault.found == "an object");
     let found = if is_other {
@@ -90,10 +91,9 @@ fn listed(faults: &[Fault], more: usize) -> String {
              help: give --definitions a file that says `domain = \"NAME\"`; `mirrorstats import --guess FILE` drafts one\n"
         )
     });
-    let of_mirror = |fault: &&Fault| !is_other || fault.found != "none" || fault.key.as_deref().is_none_or(is_general);
+    let of_mirror = |fault: &&Fault| !is_other || !is_missing(fault) || fault.key.as_deref().is_none_or(is_general);
     // A value that is there says more than one that is missing.
-    let (missing, wrong): (Vec<&Fault>, Vec<&Fault>) =
-        faults.iter().filter(of_mirror).partition(|it| it.found == "none");
+    let (missing, wrong): (Vec<&Fault>, Vec<&Fault>) = faults.iter().filter(of_mirror).partition(|it| is_missing(it));
     let shown: Vec<String> =
         wrong.into_iter().chain(missing).take(if is_nested { 1 } else { SHOWN }).map(ToString::to_string).collect();
     let more = more + faults.len() - shown.len();

@@ -146,7 +146,7 @@ fn survey(
     faults: &mut Faults,
 ) -> Result<(), ImportError> {
     let steps = text.steps()?;
-    let (order, batches) = (steps.order, steps.spool.batches.len());
+    let (order, absent, batches) = (steps.order, steps.absent.clone(), steps.spool.batches.len());
     let unread = std::mem::take(&mut steps.faults);
     if batches == 0 && unread.is_empty() {
         faults.add(Fault {
@@ -160,7 +160,7 @@ fn survey(
     for batch in 0..batches {
         let place = |row| text.place(batch, row);
         let (rows, mut found) = columns.completed(&text.batch(batch)?, &text.folders, limits);
-        found.extend(columns.check(&rows, &place, order, limits));
+        found.extend(columns.check(&rows, &place, (order, &absent), limits));
         let refused: HashSet<usize> = found.iter().map(|(row, _)| *row).collect();
         found.extend(index.add((at, batch), &rows, place, |row| refused.contains(&row)));
         found.sort_by_key(|(row, _)| *row);

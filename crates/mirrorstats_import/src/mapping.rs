@@ -53,6 +53,8 @@ pub(super) struct Settings {
     pub(super) path: String,
     /// Values by which rows are left out.
     pub(super) skip: IndexMap<String, Value>,
+    /// Required columns of the mirror's domain that have no meaning in the files.
+    pub(super) absent: Vec<String>,
     /// A prefix for the names of columns that no entry names.
     pub(super) others: String,
     /// The description of a file that the mapping reads, and values that it has.
@@ -90,6 +92,8 @@ struct Change {
     value: Option<Value>,
     start: Option<i64>,
     scale: Option<f64>,
+    /// True to take the nearest integer.
+    round: bool,
     /// The unit of the scaled numbers, for readers of the file.
     unit: Option<String>,
     words: IndexMap<String, Value>,
@@ -219,6 +223,7 @@ impl Mapping {
 
     /// This mapping on top of another one.
     pub(super) fn over(&self, mut other: Self) -> Self {
+        other.settings.absent.retain(|name| !self.columns.contains_key(name));
         other.columns.extend(self.columns.clone());
         other
     }
@@ -293,6 +298,10 @@ impl Mapping {
             if let Source::Constant(value) = source {
                 columns.push((name.clone(), array(vec![Cell::of_json(value); rows])));
             }
+        }
+        let may_be_null = |name: &&String| column(name).is_some_and(|column| column.nullable);
+        for name in self.settings.absent.iter().filter(may_be_null) {
+            columns.push((name.clone(), new_null_array(&DataType::Null, rows)));
         }
         Ok(arrays::table(columns, rows))
     }
@@ -389,18 +398,23 @@ impl Source {
 
 impl Change {
     fn is_none(&self) -> bool {
-        self.scale.is_none() && self.words.is_empty()
+        self.scale.is_none() && !self.round && self.words.is_empty()
     }
 
-    /// The value of a word, in another unit: an integer if dividing by the factor gives the number again.
+    /// The value of a word, in another unit: an integer if dividing by the factor gives the number again, or if the mapping
+    /// rounds.
     #[expect(clippy::float_cmp, reason = "that is the question")]
     fn of<'a>(&'a self, cell: &Cell<'a>) -> Cell<'a> {
         let word = cell.text().and_then(|text| self.words.get(&*text));
         let cell = word.map_or_else(|| cell.clone(), Cell::of_json);
         let number = cell.clone().typed(Kind::Float).float();
-        let Some((factor, number)) = self.scale.zip(number) else { return cell };
+        let Some((factor, number)) = self.scale.or(self.round.then_some(1.0)).zip(number) else { return cell };
         let product = (number * factor).round();
-        if product / factor == number { Cell::Float(product).typed(Kind::Int) } else { Cell::Float(number * factor) }
+        if self.round || product / factor == number {
+            Cell::Float(product).typed(Kind::Int)
+        } else {
+            Cell::Float(number * factor)
+        }
     }
 }
 

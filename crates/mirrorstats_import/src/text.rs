@@ -20,7 +20,7 @@ use super::rows::Rows;
 use super::spool::Spool;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::{hash, input};
-use mirrorstats_trace::inputs::{Input, NULL_FOLDER, folder_values};
+use mirrorstats_trace::inputs::{Input, NULL_FOLDER, folder_values, is_data_set};
 
 #[derive(Debug)]
 pub struct Text {
@@ -45,6 +45,8 @@ pub(super) struct Steps {
     /// The mapping for the footer; `None` for unmapped lines of steps.
     pub(super) mapping: Option<Value>,
     pub(super) order: Order,
+    /// Required columns that the mapping declares absent.
+    pub(super) absent: Vec<String>,
     pub(super) spool: Spool,
     pub(super) faults: Faults,
 }
@@ -160,7 +162,7 @@ impl Text {
 
     /// The frames of a data set of `LeRobot`; `None` if the folder is none.
     pub fn of_data_set(folder: &Path, mapping: &Mapping, notes: &mut Notes) -> Result<Option<Self>, ImportError> {
-        if !lerobot::is_data_set(folder) {
+        if !is_data_set(folder) {
             return Ok(None);
         }
         let (name, format) = (Input::new(folder).name, Format::LeRobot);
@@ -170,6 +172,11 @@ impl Text {
         let read = Steps::of(source, (format, &effective, mapping), Given::new(), notes, read)?;
         let file = tempfile::tempfile().map_err(ImportError::read(&name))?;
         Ok(Some(Self { read: Some(read), ..Self::of_file(&name, file) }))
+    }
+
+    /// The built-in definitions of its format, if it has a domain and is read.
+    pub fn definitions(&self) -> Option<&'static str> {
+        self.read.as_ref()?.format.definitions()
     }
 
     /// The steps; those of plain lines if nothing else was asked for.
@@ -226,7 +233,8 @@ impl Steps {
         let is_plain = rows.is_strict && asked.is_empty();
         let (noun, order, mapping) = (rows.noun, effective.order(), (!is_plain).then(|| asked.declared()));
         let (spool, faults) = rows.finish()?;
-        Ok(Self { sha256, noun, format, mapping, order, spool, faults })
+        let absent = effective.settings.absent.clone();
+        Ok(Self { sha256, noun, format, mapping, order, absent, spool, faults })
     }
 }
 

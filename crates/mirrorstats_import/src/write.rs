@@ -1,6 +1,6 @@
 //! The second pass: casts the rows of every episode and writes them in their order.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,6 +9,7 @@ use arrow::compute::{concat_batches, take_record_batch};
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::error::ArrowError;
 use parquet::errors::ParquetError;
+use serde_json::json;
 
 use super::Limits;
 use super::arrays::stored;
@@ -32,6 +33,10 @@ pub(super) fn write(
     limits: Limits<'_>,
 ) -> Result<NewFile, ImportError> {
     let mut recording = limits.recording(texts);
+    if !columns.absent.is_empty() {
+        let declared = |(name, absent): (&String, &BTreeSet<String>)| json!({ "name": name, "absent": absent });
+        recording["experiments"] = columns.absent.iter().map(declared).collect();
+    }
     if columns.is_derived {
         put_version(&mut recording);
     }

@@ -91,7 +91,8 @@ pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(),
 
 fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     let absent = || "record it, or choose other metrics with --metrics".to_owned();
-    let has_default = traces.domain().column(column).is_some_and(|known| known.default.is_some());
+    let has_default =
+        traces.domain().column(column).is_some_and(|known| known.default.is_some() || known.is_of_some_tasks);
     let Some(found) = traces.column(column) else { return Some(("no trace has it".to_owned(), absent())) };
     if let Some([(first, a), (second, b)]) = found.conflict {
         let problem = format!("it is {} in `{first}` and {} in `{second}`", a.name(), b.name());

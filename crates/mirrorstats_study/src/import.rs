@@ -22,7 +22,7 @@ use mirrorstats_import::{ImportError, Limits, Mapping, MappingError, Notes, Text
 use mirrorstats_metric::file;
 use mirrorstats_score::tables::columns::KEYS;
 use mirrorstats_trace::footers::declared::Cluster;
-use mirrorstats_trace::inputs::{Input, is_report};
+use mirrorstats_trace::inputs::{Input, is_data_set, is_report};
 use mirrorstats_trace::read::open::TraceFile;
 use mirrorstats_trace::schema::colors::palette::Palette;
 use mirrorstats_trace::schema::{Kind, RECORDING_KEY};
@@ -45,8 +45,9 @@ kinds! { Argument: PaletteError; Definitions: MappingError; }
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
     pub out: PathBuf,
-    /// The definitions that give the known experiments, by name or path.
-    pub definitions: PathBuf,
+    /// The definitions that give the known experiments, by name or path; those of the files' format if `None`, or else the
+    /// paper's.
+    pub definitions: Option<PathBuf>,
     /// Names of colours separated by commas, a file of names, or `default`.
     pub palette: Option<PathBuf>,
     /// True if the episodes of one seed are more alike than chance.
@@ -82,7 +83,10 @@ pub struct OwnColumn {
 
 /// Makes a trace from the steps in these texts; writes nothing if that fails.
 pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAnswer, StudyError> {
-    let expected = ExpectedTraces::of(&request.definitions)?;
+    let of_format = texts.first().and_then(Text::definitions);
+    let of_format = of_format.filter(|_| texts.iter().all(|text| text.definitions() == of_format));
+    let default = || Path::new(of_format.unwrap_or(DEFAULT_DEFINITIONS));
+    let expected = ExpectedTraces::of(request.definitions.as_deref().unwrap_or_else(default))?;
     let palette = request.palette.as_deref().map(palette).transpose()?;
     let limits = Limits {
         expected: expected.as_expected(),
@@ -140,12 +144,15 @@ impl Logs {
         let mut notes = Notes::default();
         let mapping = mapping.unwrap_or_default();
         let text = |input: &Input| {
+            if let Some(text) = Text::of_data_set(&input.path, &mapping, &mut notes)? {
+                return Ok(text);
+            }
             let mut text = Text::open(&input.path)?;
             text.read(&mapping, None, &mut notes).map(|()| text)
         };
         let texts = logs.iter().map(text).collect::<Result<Vec<_>, ImportError>>()?;
         let out = folder.path().join("logs.parquet");
-        let definitions = definitions.unwrap_or(Path::new(DEFAULT_DEFINITIONS)).to_owned();
+        let definitions = definitions.map(Path::to_owned);
         import(texts, &ImportRequest { out: out.clone(), definitions, ..ImportRequest::default() })?;
         others.push(Input { name, path: out });
         others.sort();
@@ -157,6 +164,9 @@ impl Logs {
 /// Returns true if another program wrote the file. What cannot be told from its first bytes is left to the reader of
 /// traces and scores.
 fn is_log(input: &Input, has_mapping: bool) -> bool {
+    if is_data_set(&input.path) {
+        return true;
+    }
     let Ok(file) = input::open(&input.path) else { return false };
     let mut head = Vec::new();
     if file.take(HEAD).read_to_end(&mut head).is_err() {

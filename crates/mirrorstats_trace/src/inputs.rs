@@ -84,6 +84,9 @@ fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
     let path = Path::new(argument);
     if path.exists() {
         let help = "name the folder that the recorder wrote to";
+        if is_data_set(path) {
+            return Ok(vec![path.to_owned()]);
+        }
         let traces = traces_at(path)?;
         let files = if traces.is_empty() { logs_in(path)? } else { traces };
         return some(files, "a folder without any *.parquet in it", help);
@@ -139,12 +142,19 @@ fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
 }
 
 pub fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
-    if !path.is_dir() {
+    if !path.is_dir() || is_data_set(path) {
         return Ok(vec![path.to_owned()]);
     }
-    let failed = |source| TraceError::Read { what: path.display().to_string(), source };
-    let mut traces = Vec::new();
-    for entry in fs::read_dir(path).map_err(failed)? {
+    let mut files = files_below(path)?;
+    files.retain(|file| file.extension() == Some(OsStr::new("parquet")));
+    Ok(files)
+}
+
+/// The files in a folder and in those below it, except hidden ones and what a report holds.
+fn files_below(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
+    let failed = |source| TraceError::Read { what: folder.display().to_string(), source };
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let below = entry.path();
         if entry.file_name().to_string_lossy().starts_with(['_', '.']) {
@@ -152,28 +162,32 @@ pub fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
         }
         if entry.file_type().map_err(failed)?.is_dir() {
             if !is_report(&below) {
-                traces.extend(traces_at(&below)?);
+                files.extend(files_below(&below)?);
             }
-        } else if below.extension() == Some(OsStr::new("parquet")) && !below.is_dir() {
-            traces.push(below);
+        } else if !below.is_dir() {
+            files.push(below);
         }
     }
-    Ok(traces)
+    Ok(files)
 }
 
-/// Endings of logs of other programs.
-const LOGS: [&str; 4] = ["csv", "eval", "jsonl", "tsv"];
+/// Returns true if the folder is a data set of `LeRobot`, whose rows lie in several files.
+pub fn is_data_set(folder: &Path) -> bool {
+    folder.join("meta/info.json").is_file()
+}
 
-/// The logs in a folder without traces; not the lists that mirrorstats writes beside traces.
+/// Endings of logs of other programs, and one that other files have too.
+const LOGS: [&str; 4] = ["csv", "eval", "jsonl", "tsv"];
+const MAYBE_LOG: &str = "json";
+
+/// The logs in a folder without traces and below it; not the lists that mirrorstats writes beside traces.
 fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
-    let failed = |source| TraceError::Read { what: folder.display().to_string(), source };
-    let paths = fs::read_dir(folder).map_err(failed)?.map(|entry| Ok(entry.map_err(failed)?.path()));
-    let is_list = |path: &PathBuf| ["lost.jsonl", "labels.jsonl"].iter().any(|name| path.ends_with(name));
-    let has_ending = |path: &PathBuf| path.extension().is_some_and(|ending| LOGS.iter().any(|log| ending == *log));
-    let is_log = |path: &Result<PathBuf, TraceError>| {
-        path.as_ref().map_or(true, |path| has_ending(path) && !is_list(path) && path.is_file())
-    };
-    paths.filter(is_log).collect()
+    let ends_in = |path: &Path, ending: &str| path.extension().is_some_and(|found| found == ending);
+    let is_list = |path: &Path| ["lost.jsonl", "labels.jsonl"].iter().any(|name| path.ends_with(name));
+    let files = files_below(folder)?;
+    let is_log = |path: &&PathBuf| LOGS.iter().any(|log| ends_in(path, log)) && !is_list(path);
+    let logs: Vec<PathBuf> = files.iter().filter(is_log).cloned().collect();
+    Ok(if logs.is_empty() { files.into_iter().filter(|path| ends_in(path, MAYBE_LOG)).collect() } else { logs })
 }
 
 /// Returns true if `mirrorstats report` wrote the folder: its Parquet file holds scores, not steps.

@@ -242,7 +242,7 @@ impl Shape<'_> {
     ) -> Result<Vec<(Field, ArrayRef)>, TraceError> {
         let column = |place: &usize| {
             let (column, values) = (&self.layout.columns[*place], values(*place).map_err(TraceError::Memory)?);
-            let nullable = column.known.is_none_or(|known| known.nullable);
+            let nullable = column.known.is_none_or(|known| known.nullable || known.is_of_some_tasks);
             Ok((Field::new(&column.name, values.data_type().clone(), nullable), values))
         };
         places.iter().map(column).collect()

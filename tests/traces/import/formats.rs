@@ -220,13 +220,83 @@ fn the_folder_of_a_lerobot_data_set_is_imported_with_its_tasks() {
         "{told}"
     );
     let info = at.join("other/meta/info.json");
-    let text = fs::read_to_string(&info).unwrap().replace("v3.0", "v2.1");
+    let text = fs::read_to_string(&info).unwrap().replace("v3.0", "v1.6");
     fs::write(&info, text).unwrap();
     let told = run(at, &import("other", &SET)).refused();
-    assert!(told.contains("other, meta/info.json") && told.contains("found version v2.1"), "{told}");
+    assert!(told.contains("other, meta/info.json") && told.contains("found version v1.6"), "{told}");
     fs::remove_file(info).unwrap();
     let told = run(at, &import("other", &SET)).refused();
     assert!(told.contains("it is a folder; name the files in it"), "{told}");
+}
+
+#[test]
+fn a_lerobot_data_set_of_version_2_has_its_tasks_and_counts_in_lines() {
+    let folder = folder();
+    let at = folder.path();
+    logs::lerobot_data_set(&at.join("pusht"), &[Some(2), None], false);
+    let expected = run(at, &import("pusht", &SET)).done();
+    let meta = at.join("pusht/meta");
+    let info = fs::read_to_string(meta.join("info.json")).unwrap().replace("v3.0", "v2.1");
+    fs::write(meta.join("info.json"), info).unwrap();
+    fs::remove_file(meta.join("tasks.parquet")).unwrap();
+    fs::remove_dir_all(meta.join("episodes")).unwrap();
+    fs::write(meta.join("tasks.jsonl"), "{\"task_index\": 0, \"task\": \"Push the block\"}\n").unwrap();
+    let line = |episode| format!("{{\"episode_index\": {episode}, \"tasks\": [], \"length\": 8}}\n");
+    fs::write(meta.join("episodes.jsonl"), line(0) + &line(1)).unwrap();
+    assert_eq!(run(at, &import("pusht", &SET)).done(), expected);
+    #[cfg(feature = "polars")]
+    assert_eq!(queried(at, "distinct task, fps")[..], ["Push the block,10"]);
+    // The folder stands for its trace, with a definition file that says what the data set does not.
+    let mapping = "[import]\nformat = \"lerobot\"\n[import.columns]\nmodel = { value = \"act\" }\nseed = 1\n\
+                   experiment = { value = \"reach\" }\n";
+    fs::write(at.join("with.toml"), format!("{DEFINITIONS}{mapping}")).unwrap();
+    let scores = |input| run(at, &["report", input, "--definitions", "with.toml", "--no-figures"]).done();
+    assert_eq!(
+        scores("pusht").lines().take(9).collect::<Vec<_>>(),
+        scores("x.parquet").lines().take(9).collect::<Vec<_>>()
+    );
+    fs::write(meta.join("episodes.jsonl"), line(0) + &line(1) + &line(2)).unwrap();
+    let told = run(at, &import("pusht", &SET)).refused();
+    assert!(told.contains("expected the frames of episode 2") && told.contains("found 8 fewer"), "{told}");
+}
+
+#[test]
+fn results_of_mirrorbench_score_as_their_own_metrics_say() {
+    let folder = folder();
+    let at = folder.path();
+    let write = |place: &str, distances: &[f64], unreadable: u64| {
+        let path = at.join("results").join(place);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let log = json!({ "track": "Human", "tag": "20260105-120000", "steps": distances.len() - 1, "sir": 0.5,
+                          "improvement_steps": 1, "bad_response": unreadable, "distances": distances });
+        fs::write(path, log.to_string()).unwrap();
+    };
+    // Two of three steps are nearer, the last one within one step of the hand; as 32-bit floats write the numbers.
+    write("level1/gpt-4o/male_0-mano_white-splash/a.json", &[0.3, 0.200_000_002_98, 0.3, 0.099_999_99], 0);
+    write("level2/gpt-4o/male_0-mano_white-splash/b.json", &[0.5, 0.5, 0.4, 0.5], 1);
+    let scored = |inputs: &[&str]| {
+        run(at, &[&["score"], inputs, &["-o", "s.csv"]].concat()).done();
+        let text = fs::read_to_string(at.join("s.csv")).unwrap();
+        let rows = text.lines().skip(1).map(|row| row.split(',').take(11).collect::<Vec<_>>().join(","));
+        rows.collect::<Vec<_>>()
+    };
+    let expected = [
+        "level1/gpt-4o/male_0-mano_white-splash/a,gpt-4o,level1,1,1,male_0-mano_white-splash,1,666667,1000000,1000000,0",
+        "level2/gpt-4o/male_0-mano_white-splash/b,gpt-4o,level2,1,1,male_0-mano_white-splash,0,333333,0,250000,1",
+    ];
+    assert_eq!(scored(&["results"]), expected);
+    let files = [
+        "results/level1/gpt-4o/male_0-mano_white-splash/a.json",
+        "results/level2/gpt-4o/male_0-mano_white-splash/b.json",
+    ];
+    let answer = run(at, &[&["import"], &files[..], &["-o", "x.parquet"]].concat()).ends(0);
+    assert!(answer.stderr.contains("left out: 2 rows whose `#` is 0"), "{}", answer.stderr);
+    assert_eq!(scored(&["x.parquet", "--definitions", "reach"]), expected);
+    assert!(run(at, &["trace", "validate", "x.parquet"]).done().contains("0 errors"));
+    // The model and the level are in the folders.
+    fs::copy(at.join(files[0]), at.join("a.json")).unwrap();
+    let told = run(at, &["import", "a.json", "-o", "y.parquet"]).refused();
+    assert!(told.contains("key `model`") && told.contains("key `experiment`"), "{told}");
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! LeRobot's frames: files below `data`, and the folder of a data set, version 3, with `meta/info.json`, tasks and
-//! episodes. Only what a mapping cannot say is here: distances of actions, tasks and counts in other files.
+//! LeRobot's frames: files below `data`, and the folder of a data set with `meta/info.json`, tasks and episodes, which are
+//! Parquet in version 3 and JSON Lines in version 2. Only what a mapping cannot say is here: distances of actions, tasks and counts in other files.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -25,16 +25,18 @@ const INFO: &str = "meta/info.json";
 /// The features of a robot with many cameras take tens of kilobytes.
 const LARGEST_INFO: Limit = Limit::new("bytes of meta/info.json", 16 << 20);
 
-type NamedArrays = Vec<(String, ArrayRef)>;
+const TASKS_OF_V2: &str = "meta/tasks.jsonl";
+const EPISODES_OF_V2: &str = "meta/episodes.jsonl";
+/// A hundred thousand episodes take some 10 MB.
+const LARGEST_LINES: Limit = Limit::new("bytes of tasks or episodes", 256 << 20);
 
-pub(crate) fn is_data_set(folder: &Path) -> bool {
-    folder.join(INFO).is_file()
-}
+type NamedArrays = Vec<(String, ArrayRef)>;
 
 /// The hash of a data set: of its metadata and frame files, with their paths in the folder.
 pub(crate) fn hash_of(folder: &Path) -> Result<String, ImportError> {
     let mut lines = Vec::new();
-    let files = [vec![folder.join(INFO), folder.join("meta/tasks.parquet")], below(folder, "meta/episodes")?];
+    let one_each = [INFO, "meta/tasks.parquet", TASKS_OF_V2, EPISODES_OF_V2].map(|name| folder.join(name));
+    let files = [one_each.to_vec(), below(folder, "meta/episodes")?];
     for path in files.into_iter().flatten().chain(below(folder, "data")?).filter(|path| path.is_file()) {
         let failed = || ImportError::read(&Input::new(&path).name);
         let sha256 = hash::of_reader(input::open(&path).map_err(failed())?).map_err(failed())?;
@@ -82,12 +84,12 @@ pub(crate) fn read_folder(folder: &Path, rows: &mut Rows<'_>) -> Result<(), Impo
 fn constants(folder: &Path, rows: &Rows<'_>) -> Result<Vec<(&'static str, Value)>, ImportError> {
     let path = folder.join(INFO);
     let text = input::text(&path, LARGEST_INFO).map_err(ImportError::read(&Input::new(&path).name))?;
-    let expected = "a data set of LeRobot, version 3, with `codebase_version`";
+    let expected = "a data set of LeRobot, version 2 or 3, with `codebase_version`";
     let help = "convert an older one with LeRobot's own script, or name its files below `data`";
     let info: Value =
         serde_json::from_str(&text).map_err(|error| rows.fault(INFO, expected, error.to_string(), help))?;
     match info["codebase_version"].as_str() {
-        Some(version) if version.starts_with("v3") => {}
+        Some(version) if version.starts_with("v3") || version.starts_with("v2") => {}
         Some(version) => return Err(rows.fault(INFO, expected, format!("version {version}"), help)),
         None => return Err(rows.fault(INFO, expected, "none", help)),
     }
@@ -97,7 +99,8 @@ fn constants(folder: &Path, rows: &Rows<'_>) -> Result<Vec<(&'static str, Value)
 
 /// Tasks by number. Pandas names the column of texts `__index_level_0__` if it has no name.
 fn tasks(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, String>, ImportError> {
-    let mut tasks = BTreeMap::new();
+    let task = |line: &Value| Some((line["task_index"].as_i64()?, line["task"].as_str()?.to_owned()));
+    let mut tasks: BTreeMap<_, _> = lines(folder, TASKS_OF_V2, rows)?.iter().filter_map(task).collect();
     let path = folder.join("meta/tasks.parquet");
     if path.is_file() {
         each_file(&path, rows, |file, rows| {
@@ -115,7 +118,8 @@ fn tasks(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, String>, Im
 
 /// The number of frames of each episode. The files also hold statistics of each feature.
 fn frames_of_episodes(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64, i64>, ImportError> {
-    let mut lengths = BTreeMap::new();
+    let length = |line: &Value| Some((line["episode_index"].as_i64()?, line["length"].as_i64()?));
+    let mut lengths: BTreeMap<_, _> = lines(folder, EPISODES_OF_V2, rows)?.iter().filter_map(length).collect();
     for path in below(folder, "meta/episodes")? {
         each_file(&path, rows, |file, rows| {
             let choose = |root: &Type, _, _: &mut Rows<'_>| ["episode_index", "length"].contains(&root.name());
@@ -128,6 +132,19 @@ fn frames_of_episodes(folder: &Path, rows: &mut Rows<'_>) -> Result<BTreeMap<i64
         })?;
     }
     Ok(lengths)
+}
+
+/// The objects of JSON Lines; none if there is no such file.
+fn lines(folder: &Path, name: &str, rows: &Rows<'_>) -> Result<Vec<Value>, ImportError> {
+    let path = folder.join(name);
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
+    let text = input::text(&path, LARGEST_LINES).map_err(ImportError::read(&Input::new(&path).name))?;
+    let help = "copy the data set again";
+    let object = |line| serde_json::from_str(line);
+    let objects = text.lines().filter(|line| !line.trim().is_empty()).map(object).collect::<Result<_, _>>();
+    objects.map_err(|error| rows.fault(name, "strict JSON in each line", error.to_string(), help))
 }
 
 fn below(folder: &Path, name: &str) -> Result<Vec<PathBuf>, ImportError> {

@@ -32,6 +32,8 @@ pub enum Format {
     Atif,
     /// The aggregate file of `vla-eval export`.
     VlaEval,
+    /// A result file of `MirrorBench`.
+    MirrorBench,
 }
 
 mirrorstats_exact::names!(Format {
@@ -44,11 +46,12 @@ mirrorstats_exact::names!(Format {
     LeRobot: "lerobot",
     Atif: "atif",
     VlaEval: "vla-eval",
+    MirrorBench: "mirrorbench",
 });
 
 /// The mappings of formats, each with the bytes that a file of its kind has near its start; the last one that fits
 /// counts, or else the last of the format.
-const MAPPINGS: [(Format, &str, &str); 6] = [
+const MAPPINGS: [(Format, &str, &str); 7] = [
     (Format::Atif, "\"ATIF-v", include_str!("../../../../assets/import/atif.toml")),
     (Format::VlaEval, "\"harness_version\"", include_str!("../../../../assets/import/vla-eval.toml")),
     (
@@ -56,6 +59,7 @@ const MAPPINGS: [(Format, &str, &str); 6] = [
         "\"inspect_robots_version\"",
         include_str!("../../../../assets/import/inspect-robots.toml"),
     ),
+    (Format::MirrorBench, "\"improvement_steps\"", include_str!("../../../../assets/import/mirrorbench.toml")),
     (Format::LeRobot, "PAR1", include_str!("../../../../assets/import/lerobot-frames.toml")),
     (Format::LeRobot, "\"per_episode\"", include_str!("../../../../assets/import/lerobot-episodes.toml")),
     (Format::LeRobot, "\"per_task\"", include_str!("../../../../assets/import/lerobot-tasks.toml")),
@@ -102,6 +106,16 @@ impl Format {
         !matches!(self, Self::JsonLines | Self::Json | Self::Csv | Self::Parquet)
     }
 
+    /// The built-in definitions of the domain that its files are about.
+    pub(super) const fn definitions(self) -> Option<&'static str> {
+        match self {
+            Self::Inspect | Self::Atif => Some("tools"),
+            Self::InspectRobots | Self::LeRobot | Self::VlaEval => Some("robots"),
+            Self::MirrorBench => Some("reach"),
+            Self::JsonLines | Self::Json | Self::Csv | Self::Parquet => None,
+        }
+    }
+
     /// The mapping of the format, if it has one.
     pub(super) fn mapping(self, head: &[u8]) -> Option<Mapping> {
         let head = String::from_utf8_lossy(head);
@@ -123,7 +137,7 @@ impl Format {
             Self::Parquet => parquet::read(reader.into_inner(), rows),
             Self::Inspect => inspect::read(reader, rows),
             Self::LeRobot if is_parquet => lerobot::read_frames(reader.into_inner(), rows, &mut |_| Vec::new()),
-            Self::Json | Self::InspectRobots | Self::LeRobot | Self::Atif | Self::VlaEval => {
+            Self::Json | Self::InspectRobots | Self::LeRobot | Self::Atif | Self::VlaEval | Self::MirrorBench => {
                 objects::read_object(reader, rows)
             }
         }

@@ -107,7 +107,8 @@ fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Box<Fi
     let known = |name: &Value| of_some_tasks().find(|known| *name == **known);
     let Some(value) = value else { return Ok(Vec::new()) };
     let named: Option<Vec<_>> = value.as_array().and_then(|names| names.iter().map(known).collect());
-    let named = named.ok_or_else(|| fault(key, "a list of `self_color` and `selected_cube`", value))?;
+    let expected = || format!("a list of `{}`", of_some_tasks().collect::<Vec<_>>().join("`, `"));
+    let named = named.ok_or_else(|| fault(key, &expected(), value))?;
     Ok(of_some_tasks().filter(|known| named.contains(known)).collect())
 }
 
@@ -218,7 +219,7 @@ mod tests {
             (of("chance", json!([1])), "experiment.chance` to be an object"),
             (
                 of("absent", json!(["t"])),
-                "experiment.absent` to be a list of `self_color` and `selected_cube`\n  found `[\"t\"]`",
+                "experiment.absent` to be a list of `body_color`, `action`, `self_color`, `selected_cube`\n  found `[\"t\"]`",
             ),
             (of("reference", json!({ "TSA": "1/3" })), "experiment.reference.TSA` to be a list of fractions"),
             (json!({ "experiments": {} }), "experiments` to be a list of objects"),

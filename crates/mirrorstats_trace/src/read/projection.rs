@@ -6,7 +6,7 @@ use crate::schema::{Column, DeclaredColumn, Domain, Kind};
 
 /// Columns that every pass reads, at these positions.
 pub(crate) const KEYS: [&str; 6] = ["episode_id", "model", "experiment", "seed", "run", "t"];
-/// A column that every pass over traces of the mirror's domain reads as well.
+/// A column that every pass over traces of the mirror's domain reads as well, unless all of them lack it.
 pub(crate) const BODY_COLOR: &str = "body_color";
 pub(crate) const EPISODE_ID: usize = 0;
 pub(crate) const T: usize = 5;
@@ -36,7 +36,8 @@ impl Layout {
         constants: impl IntoIterator<Item = &'a str>,
     ) -> Result<Self, TraceError> {
         let mut layout = Self { columns: Vec::new() };
-        let beside = (set.domain() == Domain::Mirror).then_some(BODY_COLOR);
+        let has_colors = set.domain() == Domain::Mirror && set.column(BODY_COLOR).is_some();
+        let beside = has_colors.then_some(BODY_COLOR);
         for name in KEYS.into_iter().chain(beside).chain(steps) {
             layout.add(set, name, false)?;
         }

@@ -39,7 +39,7 @@ pub struct Column {
     #[serde(skip)]
     pub counts: bool,
     #[serde(rename(deserialize = "task"), default, skip_serializing)]
-    pub(crate) is_of_some_tasks: bool,
+    pub is_of_some_tasks: bool,
     #[serde(rename(deserialize = "mark"), default, skip_serializing)]
     pub(crate) is_mark: bool,
     #[serde(rename(deserialize = "in"), default, skip_serializing)]

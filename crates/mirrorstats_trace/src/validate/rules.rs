@@ -63,6 +63,10 @@ impl Rules<'_> {
     fn of_column<'a>(&'a self, at: usize, column: &'a LayoutColumn, file: &'a TraceFile) -> Vec<Rule<'a>> {
         let known = Known { palette: file.palette(), experiments: self.experiments };
         let mut rules = column.known.map_or_else(Vec::new, |column| rules_of(column, known));
+        // Only a file whose experiments declare the column absent may lack it.
+        if file.column(&column.name).is_none() {
+            rules.retain(|rule| rule.asks != Requirement::Present);
+        }
         if !column.values.is_empty() && column.kind == Kind::String {
             rules.push(Rule { code: Code::UnknownValue, asks: Requirement::Among(&column.values) });
         }

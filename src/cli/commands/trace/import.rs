@@ -23,7 +23,7 @@ pub struct ImportArgs {
     #[arg(value_name = "FILE", required = true)]
     steps: Vec<PathBuf>,
     /// The format of the files, or a mapping file: `jsonl`, `json`, `csv`, `parquet`, `inspect`, `inspect-robots`,
-    /// `lerobot`, `atif`, `vla-eval`, or a TOML file [default: detected from names and first bytes]
+    /// `lerobot`, `atif`, `vla-eval`, `mirrorbench`, or a TOML file [default: detected from names and first bytes]
     #[arg(long, value_name = "FORMAT|FILE.toml")]
     from: Option<PathBuf>,
     /// The trace to write
@@ -32,9 +32,10 @@ pub struct ImportArgs {
     /// Draft the mapping and the definitions of one file, with a first table; say what the draft rests on
     #[arg(long, conflicts_with_all = ["out", "from", "map", "set", "json", "palette", "cluster", "reconstruction"])]
     guess: bool,
-    /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
-    #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
-    definitions: PathBuf,
+    /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file [default: those of the format,
+    /// else paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    definitions: Option<PathBuf>,
     /// The possible colours, which the trace then declares: names separated by commas, a file of names, or `default`
     /// for the ten colours of the study
     #[arg(long, value_name = "NAMES|FILE|default")]
@@ -63,7 +64,8 @@ impl ImportArgs {
         let Some(out) = &self.out else { return self.draft() };
         self.check_places(out)?;
         let (from, file) = self.from.as_deref().map_or((None, None), format_or_file);
-        let mapping = Mapping::parse(file, mapping_in(&self.definitions)?, &self.map, &self.set)?;
+        let of_definitions = self.definitions.as_deref().map(mapping_in).transpose()?.flatten();
+        let mapping = Mapping::parse(file, of_definitions, &self.map, &self.set)?;
         let mut notes = Notes::default();
         let texts =
             self.steps.iter().map(|path| text(path, from, &mapping, &mut notes)).collect::<Result<Vec<_>, _>>()?;
@@ -95,7 +97,7 @@ impl ImportArgs {
             return Err(Failure::input(words));
         }
         replace::check_target(out, &self.steps, "the steps themselves")?;
-        output::check_target(out, [&self.definitions].into_iter().chain(&self.palette))
+        output::check_target(out, self.definitions.iter().chain(&self.palette))
     }
 }
 

@@ -36,6 +36,8 @@ pub struct Episode {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_distance: Option<i32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unreadable_answers: Option<i32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shown_color: Option<String>,
     /// The steps t = 1..T in order; never empty where an episode is whole.
     #[serde(skip)]

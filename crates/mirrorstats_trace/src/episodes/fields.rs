@@ -50,7 +50,7 @@ macro_rules! fields {
 const FIELDS: &[(&str, Access)] = fields! {
     episode, _at => episode, [
         episode_id model experiment seed run body_color stated_color distractors condition scene repetition decision fingerprint
-        participant episode_hash start_distance shown_color
+        participant episode_hash start_distance unreadable_answers shown_color
     ];
     episode, at => episode.steps[at], [action self_color selected_cube mirror_visible];
     episode, at => episode.steps[at].extra, [

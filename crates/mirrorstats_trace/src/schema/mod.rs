@@ -61,6 +61,7 @@ mod tests {
             "participant",
             "episode_hash",
             "start_distance",
+            "unreadable_answers",
             "shown_color",
         ];
         assert_eq!(constants[expected.len()..], newer);

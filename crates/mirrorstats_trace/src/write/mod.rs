@@ -68,6 +68,7 @@ impl OptionalColumns {
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "mirror_double_px" => shows_another_body(&experiment["mirror"]),
             "shown_color" | "shown_px" => shows_another_color(&experiment["mirror"]),
+            "unreadable_answers" => false,
             "start_distance" | "target_distance" => experiment["hand"].is_object(),
             "answer" | "answer_truth" => experiment["decision"] == "answer",
             _ => match (numbered(name, "pane"), numbered(name, "mark")) {

@@ -252,7 +252,8 @@ class Study:
     def figure(
         self,
         name: Literal[
-            "spider", "heatmap", "scatter", "completion-gap", "e5-outcomes", "intervals", "slopes", "decision-curve", "gaze"
+            "spider", "heatmap", "scatter", "completion-gap", "e5-outcomes", "intervals", "forest", "slopes",
+            "dose-response", "decision-curve", "gaze"
         ],
         *,
         style: Style = "default",

@@ -123,7 +123,7 @@ fn reports_statistics_figures_and_differences_know_any_domain() {
         durations.contains("Kaplan-Meier") && durations.contains("Durations: unfinished episodes censored"),
         "{durations}"
     );
-    for figure in ["intervals", "heatmap", "spider", "decision-curve"] {
+    for figure in ["intervals", "forest", "heatmap", "spider", "decision-curve"] {
         asked(at, &["figure", figure, "-o", "figure.svg"]);
         let drawn = fs::read_to_string(at.join("figure.svg")).unwrap();
         assert!(drawn.contains("diffusion") && !drawn.contains("\"TSA\""), "{figure}");

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use cast::Cast;
+use mirrorstats_analysis::statistics::Contrast;
 use mirrorstats_exact::number;
 use mirrorstats_figures::{FigureError, FigureFormat, FigureName, FigureWidth, Input, draw};
 use mirrorstats_statistics::intervals::interval::wilson;
@@ -260,6 +261,51 @@ fn a_decision_curve_counts_decided_episodes() {
 }
 
 #[test]
+fn a_forest_has_the_differences_and_verdicts_of_the_statistics() {
+    let cast = cast::paper();
+    let found = &cast.statistics;
+    let marks = marks(&svg(FigureName::Forest, &cast));
+    assert_eq!(marks.len(), 28 * 6 + 8 * 3);
+    let mut shown = 0;
+    for mark in &marks {
+        let (first, second) = (mark["model"].as_str(), mark["against"].as_str());
+        let is_pair = |a: &str, b: &str| (a, b) == (first, second) || (b, a) == (first, second);
+        let (is_turned, difference, interval, is_shown) = if mark["experiment"] == "over all" {
+            let row = found.overall.iter().find(|row| is_pair(&row.first, &row.second)).unwrap();
+            (row.first != first, row.difference, row.interval, row.separated)
+        } else if second.is_empty() {
+            let named = |it: &&Contrast| format!("{} − {}", it.baseline, it.against) == mark["experiment"];
+            let it = found.conditions.iter().filter(named).find(|it| it.model == first).unwrap();
+            (false, it.comparison.difference, it.comparison.interval, it.comparison.separated)
+        } else {
+            let family = found.models.iter().find(|family| family.experiment == mark["experiment"]).unwrap();
+            let test = family.tests.iter().find(|test| is_pair(&test.first, &test.second)).unwrap();
+            let it = &test.comparison;
+            (test.first != first, it.difference, it.interval, it.separated)
+        };
+        let turned = |value: f64| if is_turned { 0.0 - value } else { value };
+        let ends = interval.map(|it| if is_turned { [it.high, it.low] } else { [it.low, it.high] });
+        let [value, low, high] = ["value", "low", "high"].map(|name| mark[name].parse().ok());
+        assert_eq!(value, difference.map(turned), "{mark:?}");
+        assert_eq!([low, high], [0, 1].map(|end| ends.map(|ends| turned(ends[end]))), "{mark:?}");
+        assert_eq!(mark["verdict"] == "shown", is_shown, "{mark:?}");
+        shown += usize::from(is_shown);
+    }
+    assert!(shown > 0 && shown < marks.len(), "{shown}");
+}
+
+#[test]
+fn many_models_are_each_compared_with_the_best_one() {
+    let cast = cast::made_up(&cast::names(20, 17));
+    let firsts: BTreeSet<String> = marks(&svg(FigureName::Forest, &cast))
+        .into_iter()
+        .filter(|mark| !mark["against"].is_empty())
+        .map(|mark| mark["model"].clone())
+        .collect();
+    assert_eq!(firsts.len(), 1);
+}
+
+#[test]
 fn every_episode_has_its_row_in_the_raster() {
     let cast = cast::paper();
     let svg = svg(FigureName::Gaze, &cast);
@@ -424,6 +470,11 @@ fn figures_that_cannot_be_drawn_have_a_reason() {
         draw(FigureName::CompletionGap, &Input::of_cells(&poor)),
         "figure `completion-gap` shows a rate that `completes` another one, found TSA; name them under \
          `[figure.completion-gap]` in the style, or declare them in the definitions",
+    );
+    let alone = cast.without(|e, m| e != "E5" || m != "GPT 5.1");
+    check(
+        draw(FigureName::Forest, &alone.input()),
+        "figure `forest` needs two models or two experiments with `TSA`, found GPT 5.1 and E5",
     );
     let single = cast.without(|e, _| e != "E5");
     check(

@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use crate::kit::{
-    Frame, Grid, MARGIN, Mark, Member, PALETTE, Plot, Point, ROOM_BELOW, ROOM_LEFT, Sheet, Stroke, Swatch, legend,
-    many, marker, rate_ticks, whole_ticks,
+    Fill, Frame, Grid, MARGIN, Mark, Member, PALETTE, Plot, Point, ROOM_BELOW, ROOM_LEFT, Sheet, Stroke, Swatch,
+    legend, many, marker, rate_ticks, whole_ticks,
 };
-use crate::matrix::MetricId;
+use crate::matrix::{CONFIDENCE, MetricId};
 use crate::{Drawn, FigureError, FigureName, Scene};
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
 use mirrorstats_statistics::durations::competing::{Ending, Outcome};
 use mirrorstats_statistics::durations::survival::Survival;
+use mirrorstats_statistics::intervals::interval::Interval;
 
 const MOST_COLUMNS: usize = 3;
 const LEAST_PANEL: f64 = 120.0;
@@ -25,20 +26,29 @@ pub fn draw(scene: Scene<'_>, episodes: &EpisodeTable) -> Result<Drawn, FigureEr
     let titles = matrix.titles(&matrix.experiments);
     let (mut sheet, panels) = grid.at_least(LEAST_PANEL).panels(&matrix.experiments, &titles, PLOT_HEIGHT + ROOM_BELOW);
     let last = endings.values().flatten().map(|ending| ending.steps).max().unwrap_or(1).max(1);
+    let mut has_band = false;
     for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
         let plot = Plot::new(Frame { height: PLOT_HEIGHT, ..*body }, 0.0..real(last) * 1.03, 0.0..1.04);
         let steps = whole_ticks(u32::try_from(last).unwrap_or(u32::MAX), 5);
         plot.axes(&mut sheet, (&steps, "step t"), (&rate_ticks(), "share decided"));
-        for (at, member) in roster.0.iter().enumerate() {
-            let survival = endings.get(&(*experiment, member.model)).and_then(|endings| Survival::of(endings));
-            if let Some(survival) = survival {
-                let phase = many(at) / many(roster.0.len());
-                curve(&mut sheet, &plot, &survival, experiment, *member, phase);
+        let survival = |model| endings.get(&(*experiment, model)).and_then(|endings| Survival::of(endings));
+        let curves: Vec<_> = roster.0.iter().filter_map(|it| Some((*it, survival(it.model)?))).collect();
+        for (member, survival) in &curves {
+            let is_dependent = matrix.reading(experiment, member.model, scene.metrics[0]).repeats();
+            if let Some(bounds) = survival.bounds(CONFIDENCE).filter(|_| !is_dependent) {
+                band(&mut sheet, &plot, survival, &bounds, *member);
+                has_band = true;
             }
+        }
+        for (at, (member, survival)) in curves.iter().enumerate() {
+            curve(&mut sheet, &plot, survival, experiment, *member, many(at) / many(curves.len()));
         }
     }
     let tick = Swatch::Tick(Stroke::solid(PALETTE.surface.quiet, 1.2));
-    let signs = vec![(tick, "episodes that end undecided, censored".to_owned())];
+    let mut signs = vec![(tick, "episodes that end undecided, censored".to_owned())];
+    if has_band {
+        signs.push((Swatch::Tile(Fill::faint(PALETTE.surface.text)), "95 % confidence band, by step".to_owned()));
+    }
     let height = legend::around(&mut sheet, roster, &panels, Swatch::Line, signs);
     Ok((sheet, height))
 }
@@ -65,6 +75,22 @@ fn column<'a>(episodes: &'a EpisodeTable, name: &str) -> Result<&'a MetricColumn
         let known = episodes.metrics.iter().map(|metric| metric.name.as_str()).collect::<Vec<_>>().join(", ");
         FigureError::UnknownMetric { figure: FigureName::DecisionCurve, metric: name.to_owned(), known }
     })
+}
+
+/// Fills the pointwise intervals of a curve, up to the step at which all are decided.
+fn band(sheet: &mut Sheet, plot: &Plot, survival: &Survival, bounds: &[Interval], member: Member<'_>) {
+    let mut last = Interval { low: 1.0, high: 1.0 };
+    let (mut above, mut below) = (Vec::new(), Vec::new());
+    for (point, bounds) in survival.points.iter().zip(bounds) {
+        let next = if point.undecided > 0.0 { *bounds } else { last };
+        for found in [last, next] {
+            above.push(plot.at(real(point.steps), 1.0 - found.low));
+            below.push(plot.at(real(point.steps), 1.0 - found.high));
+        }
+        last = next;
+    }
+    above.extend(below.into_iter().rev());
+    sheet.polygon(&above, Fill::faint(member.style.color));
 }
 
 /// Draws a step curve. `phase` is the position of its first marker, in [0, 1) of a distance, so that the markers of

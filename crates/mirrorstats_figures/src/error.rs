@@ -35,6 +35,8 @@ pub enum FigureError {
     MetricCount { figure: FigureName, wanted: String, found: usize },
     #[error("figure `slopes` needs two experiments or more, found {found}; add traces of another one")]
     OneExperiment { found: String },
+    #[error("figure `forest` needs two models or two experiments with `{metric}`, found {found}")]
+    NoComparison { metric: String, found: String },
     #[error(
         "figure `dose-response` needs two doses of a factor or more, found {found}; the definitions `battery` have the factors \
          delay and memory, others have `[factor.NAME]`"

@@ -19,6 +19,7 @@ mod decision_curve;
 mod dose_response;
 mod error;
 mod figure;
+mod forest;
 mod heatmap;
 mod intervals;
 mod matrix;
@@ -38,6 +39,7 @@ use e5_outcomes::Outcomes;
 use kit::lettering::FULL_WIDTH;
 use kit::{Roster, Sheet, label, lettering};
 use matrix::{Matrix, MetricId};
+use mirrorstats_analysis::statistics::Statistics;
 use mirrorstats_score::cells::Cells;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::timeline::Timeline;
@@ -55,14 +57,17 @@ pub struct Input<'a> {
     pub outcomes: Option<&'a Outcomes>,
     /// Landmarks of each episode, for `gaze`.
     pub timelines: Option<&'a [Timeline]>,
+    /// The statistics of the same episodes, for `forest`.
+    pub statistics: Option<&'a Statistics>,
     /// The printed width; `None` for the width as drawn.
     pub width: Option<FigureWidth>,
 }
 
 impl<'a> Input<'a> {
-    /// Only cells: enough for all figures except `decision-curve`, `e5-outcomes` and `gaze`.
+    /// Only cells: enough for all figures except `forest`, `decision-curve`, `e5-outcomes` and `gaze`.
     pub fn of_cells(cells: &'a Cells) -> Self {
-        Self { cells, order: &[], sheets: &SHOWN, episodes: None, outcomes: None, timelines: None, width: None }
+        let (episodes, outcomes, timelines, statistics) = (None, None, None, None);
+        Self { cells, order: &[], sheets: &SHOWN, episodes, outcomes, timelines, statistics, width: None }
     }
 }
 
@@ -79,6 +84,7 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
         FigureName::Scatter => scatter::draw(scene),
         FigureName::CompletionGap => completion_gap::draw(scene),
         FigureName::Intervals => intervals::draw(scene),
+        FigureName::Forest => forest::draw(scene, input.statistics.ok_or_else(|| missing("the statistics"))?)?,
         FigureName::Slopes => slopes::draw(scene)?,
         FigureName::DoseResponse => dose_response::draw(scene)?,
         FigureName::E5Outcomes => {

@@ -11,7 +11,7 @@ use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Kind, Metric};
 use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_statistics::intervals::interval::{self, Interval};
 
-const CONFIDENCE: f64 = 0.95;
+pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// One metric of a model in an experiment.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +48,12 @@ impl Reading<'_> {
         self.moments().map_or(0, |moments| moments.n)
     }
 
-    /// The 95 % interval of a rate; `None` for repeats, which are not independent.
+    /// Returns true if episodes share a scene, cluster or participant, and so are not independent.
+    pub(crate) fn repeats(self) -> bool {
+        matches!(self.value, Value::Known { repeats: true, .. })
+    }
+
+    /// The 95 % interval of a rate; `None` for repeats.
     pub(crate) fn wilson(self) -> Option<Interval> {
         let Value::Known { moments, repeats: false } = self.value else { return None };
         interval::wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE)

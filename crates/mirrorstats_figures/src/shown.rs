@@ -28,6 +28,8 @@ pub enum FigureName {
     E5Outcomes,
     /// Task success with its interval and the level of chance.
     Intervals,
+    /// Differences between models, and between experiments, with intervals and verdicts.
+    Forest,
     /// Task success from the first experiment to every other.
     Slopes,
     /// Task success against the dose of a factor.
@@ -46,6 +48,7 @@ mirrorstats_exact::names!(FigureName {
     CompletionGap: "completion-gap",
     E5Outcomes: "e5-outcomes",
     Intervals: "intervals",
+    Forest: "forest",
     Slopes: "slopes",
     DoseResponse: "dose-response",
     DecisionCurve: "decision-curve",
@@ -109,6 +112,7 @@ impl FigureName {
             Self::CompletionGap => ("Completion gap", [2, 2], 2, "a rate that `completes` another one"),
             Self::E5Outcomes => ("Final self-identification outcomes", [0, 0], 0, "metrics"),
             Self::Intervals => ("Task success with 95 % intervals", [1, 1], 1, "a rate"),
+            Self::Forest => ("Differences with 95 % intervals", [1, 1], 0, "a rate or a duration"),
             Self::Slopes => ("Task success from experiment to experiment", [1, 1], 1, "a rate"),
             Self::DoseResponse => ("Task success against the dose", [1, 1], 1, "a rate"),
             Self::DecisionCurve => {
@@ -162,6 +166,7 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
     let related = |pair: fn(Relations) -> Option<[String; 2]>| {
         pair(Relations::of(matrix.catalog()))?.iter().map(|name| named(name)).collect()
     };
+    let measured = |what| all.iter().find(|id| id.metric.measures() == Some(what)).map(|id| vec![*id]);
     match figure {
         FigureName::Heatmap => {
             let known: Vec<_> = listed.iter().filter_map(|name| named(name)).collect();
@@ -176,6 +181,7 @@ fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Op
                 measuring(Measures::Rate).take(2).chain(measuring(Measures::Duration).take(1)).collect();
             (found.len() == 3).then_some(found)
         }
+        FigureName::Forest => measured(Measures::Rate).or_else(|| measured(Measures::Duration)),
         FigureName::Intervals | FigureName::Slopes | FigureName::DoseResponse => {
             all.iter().find(|id| id.metric.kind == Kind::Rate).map(|id| vec![*id])
         }
@@ -196,6 +202,7 @@ pub(super) fn title(figure: FigureName, metrics: &[MetricId<'_>], catalog: &Cata
         _ if catalog.domain.is_none() => figure.title().to_owned(),
         FigureName::Scatter => format!("{} against {}", name(1), name(0)),
         FigureName::Intervals => format!("{} with 95 % intervals", name(0)),
+        FigureName::Forest => format!("Differences of {} with 95 % intervals", name(0)),
         FigureName::Slopes => format!("{} from experiment to experiment", name(0)),
         FigureName::DoseResponse => format!("{} against the dose", name(0)),
         _ => figure.title().to_owned(),

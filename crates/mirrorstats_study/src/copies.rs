@@ -1,14 +1,14 @@
 //! Copies of episodes in a study: every number counts them as independent episodes.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 
 use crate::results::Results;
 use crate::{Study, StudyError};
 use mirrorstats_exact::escape::visible;
-use mirrorstats_score::tables::table::KeyRef;
-use mirrorstats_trace::footers::declared::Origin;
+use mirrorstats_score::tables::table::{EpisodeTable, KeyRef};
+use mirrorstats_trace::footers::declared::{Origin, StepHashes};
 use mirrorstats_trace::read::open::TraceFile;
-use mirrorstats_trace::validate::copies::{Decisive, copies as find, decisive};
+use mirrorstats_trace::validate::copies::{copies as find, decisive};
 
 const NAMED: usize = 3;
 /// Equal orders of episodes are named if chance gives fewer than one in a million.
@@ -53,34 +53,17 @@ pub(crate) fn copies(study: &Study, results: &Results) -> Result<Option<Copies>,
 }
 
 /// Episodes that may be copies of others under another model, seed or run, or with other latencies: their steps are
-/// those of others. `None` without any, for scores, for large studies, and for scripts, which act alike in equal scenes.
+/// those of others. `None` without any, and without [`steps`].
 pub(crate) fn suspected(study: &Study, results: &Results) -> Result<Option<String>, StudyError> {
-    let Ok(traces) = study.traces() else { return Ok(None) };
     let table = &results.episodes;
-    // The steps of reconstructions are made up.
-    let is_made_up = table.declared.origin == Some(Origin::Reconstruction);
-    let is_large = traces.files().iter().map(TraceFile::rows).sum::<u64>() > MOST_SEARCHED;
-    if is_large
-        || is_made_up
-        || table.declared.recordings.values().any(|recording| !recording["agent"]["scripted"].is_null())
-    {
-        return Ok(None);
-    }
-    let mut known: HashMap<String, Decisive> =
-        decisive(traces, study.threads)?.into_iter().map(|it| (it.episode.clone(), it)).collect();
+    let mut known = steps(study, table)?;
     // Rows are in the order of experiment, model, seed and run.
-    let rows: Vec<(KeyRef<'_>, Decisive)> =
+    let rows: Vec<(KeyRef<'_>, StepHashes)> =
         table.keys.iter().filter_map(|key| Some((key, known.remove(key.episode_id)?))).collect();
-    let jittered = jittered(&rows);
-    if jittered > 0 {
-        let phrase =
-            format!("{jittered} episodes have the steps and, within 1 %, the latencies of others: suspected copies");
-        return Ok(Some(phrase));
-    }
     let cells: Vec<_> = rows.chunk_by(|a, b| (a.0.experiment, a.0.model) == (b.0.experiment, b.0.model)).collect();
     for (at, first) in cells.iter().enumerate() {
         let name = visible(first[0].0.model);
-        let is_same = |second: &&&[(KeyRef<'_>, Decisive)]| {
+        let is_same = |second: &&&[(KeyRef<'_>, StepHashes)]| {
             second[0].0.experiment == first[0].0.experiment && are_repeated(&prints(first), &prints(second))
         };
         if let Some(second) = cells[at + 1..].iter().find(is_same) {
@@ -98,12 +81,28 @@ pub(crate) fn suspected(study: &Study, results: &Results) -> Result<Option<Strin
             )));
         }
     }
-    Ok(None)
+    let jittered = jittered(&rows);
+    let phrase =
+        || format!("{jittered} episodes have the steps and, within 1 %, the latencies of others: suspected copies");
+    Ok((jittered > 0).then(phrase))
+}
+
+/// Hashes of the steps of the episodes, which scores carry. Empty for large studies; for reconstructions, whose steps
+/// are made up; and for scripts, which act alike in equal scenes.
+pub(crate) fn steps(study: &Study, table: &EpisodeTable) -> Result<BTreeMap<String, StepHashes>, StudyError> {
+    let Ok(traces) = study.traces() else { return Ok(table.declared.steps.clone()) };
+    let is_made_up = table.declared.origin == Some(Origin::Reconstruction);
+    let is_large = traces.files().iter().map(TraceFile::rows).sum::<u64>() > MOST_SEARCHED;
+    let mut recordings = table.declared.recordings.values();
+    if is_large || is_made_up || recordings.any(|recording| !recording["agent"]["scripted"].is_null()) {
+        return Ok(BTreeMap::new());
+    }
+    Ok(decisive(traces, study.threads)?)
 }
 
 type Print = (u64, u64);
 
-fn prints(rows: &[(KeyRef<'_>, Decisive)]) -> Vec<Print> {
+fn prints(rows: &[(KeyRef<'_>, StepHashes)]) -> Vec<Print> {
     rows.iter().map(|(_, found)| found.print).collect()
 }
 
@@ -115,15 +114,17 @@ fn counts(prints: &[Print]) -> BTreeMap<Print, u32> {
     counts
 }
 
-/// True if two lists are equal in order, though a random order would hardly be: the number of distinct orders is the
-/// multinomial coefficient.
+/// True if two lists are equal, in order or not, though random ones would hardly be. Of equal sets, the number of
+/// distinct orders is the multinomial coefficient. Two sets are equal by chance with at most the probability that a
+/// distribution with the shares of the first gives to its counts.
 fn are_repeated(first: &[Print], second: &[Print]) -> bool {
+    let found = counts(first);
     let factorial = |n: u32| (1..=n).map(|k| f64::from(k).ln()).sum::<f64>();
-    let orders = || {
-        factorial(u32::try_from(first.len()).unwrap_or(u32::MAX))
-            - counts(first).values().map(|n| factorial(*n)).sum::<f64>()
-    };
-    first == second && orders() > LEAST_ORDERS.ln()
+    let all = u32::try_from(first.len()).unwrap_or(u32::MAX);
+    let orders = factorial(all) - found.values().map(|n| factorial(*n)).sum::<f64>();
+    let shares = found.values().map(|n| f64::from(*n) * (f64::from(*n) / f64::from(all)).ln()).sum::<f64>();
+    let rare = -LEAST_ORDERS.ln();
+    first == second && -orders < rare || orders + shares < rare && found == counts(second)
 }
 
 /// True if each of many distinct episodes is there twice, or three times, ...: by chance, half of the counts are odd.
@@ -138,23 +139,23 @@ fn gcd(a: u32, b: u32) -> u32 {
 }
 
 /// The episodes with the steps and nearly the latencies of an earlier one, where latencies differ between episodes.
-fn jittered(rows: &[(KeyRef<'_>, Decisive)]) -> usize {
-    let first = |found: &Decisive| found.latencies.first().copied();
+fn jittered(rows: &[(KeyRef<'_>, StepHashes)]) -> usize {
+    let first = |found: &StepHashes| found.latencies.first().copied();
     let all: Vec<i64> = rows.iter().filter_map(|(_, found)| first(found)).collect();
     let (least, most) = (all.iter().min().copied().unwrap_or(0), all.iter().max().copied().unwrap_or(0));
     if least < LEAST_LATENCY || most * 10 < least * 11 {
         return 0;
     }
-    let mut groups: BTreeMap<Print, Vec<&Decisive>> = BTreeMap::new();
+    let mut groups: BTreeMap<Print, Vec<&StepHashes>> = BTreeMap::new();
     for (_, found) in rows.iter().filter(|(_, found)| found.latencies.len() >= FEWEST_LATENCIES) {
         groups.entry(found.print).or_default().push(found);
     }
-    let is_near = |a: &Decisive, b: &Decisive| {
+    let is_near = |a: &StepHashes, b: &StepHashes| {
         a.latencies.len() == b.latencies.len()
             && a.latencies.iter().zip(&b.latencies).all(|(a, b)| (a - b).abs() * 100 <= *a.max(b))
     };
-    let of_group = |group: &Vec<&Decisive>| {
-        let (mut found, mut originals): (usize, Vec<&Decisive>) = (0, Vec::new());
+    let of_group = |group: &Vec<&StepHashes>| {
+        let (mut found, mut originals): (usize, Vec<&StepHashes>) = (0, Vec::new());
         for episode in group {
             if originals.iter().any(|original| is_near(original, episode)) {
                 found += 1;

@@ -7,7 +7,9 @@ use std::path::PathBuf;
 
 use crate::gate::{check_metric, leading_metric};
 use crate::results::{Outputs, Results};
+use crate::statistics::statistics;
 use crate::{Study, StudyError};
+use mirrorstats_analysis::statistics::{Options, Statistics};
 use mirrorstats_figures::{Figure, FigureError, FigureName, FigureWidth, Input};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_report::bundle::OutputFile;
@@ -44,6 +46,7 @@ pub fn figure(study: &Study, name: FigureName, options: &FigureOptions) -> Resul
         style.sheet.figure.entry(name.name().to_owned()).or_default().metrics = Some(metrics.clone());
     }
     let grouped = study.grouped_with(Outputs::of_figures(&[name]))?;
+    let statistics = (name == FigureName::Forest).then(|| statistics(&grouped, &Options::default())).transpose()?;
     let mut results = grouped.counted.results;
     for metric in options.metrics.iter().flatten() {
         check_metric(&results.episodes, metric)?;
@@ -53,7 +56,7 @@ pub fn figure(study: &Study, name: FigureName, options: &FigureOptions) -> Resul
         results = results.top_models(top, &metric.map_or_else(|| leading_metric(study), Ok)?);
     }
     let results = results.with_conditions_as_models();
-    Ok(FigureInputs { width: options.width, ..FigureInputs::of(results, &style)? }.draw(name)?)
+    Ok(FigureInputs { width: options.width, ..FigureInputs::of(results, &style)? }.draw(name, statistics.as_ref())?)
 }
 
 #[derive(Debug)]
@@ -94,17 +97,19 @@ impl<'a> FigureInputs<'a> {
         Ok(Self { remark, ..Self::of(Cow::Owned(best), style)? })
     }
 
-    fn draw(&self, name: FigureName) -> Result<Figure, FigureError> {
-        mirrorstats_figures::draw(name, &self.input())
+    fn draw(&self, name: FigureName, statistics: Option<&Statistics>) -> Result<Figure, FigureError> {
+        mirrorstats_figures::draw(name, &Input { statistics, ..self.input() })
     }
 
-    pub(crate) fn draw_all(&self) -> Drawings {
+    /// The figures that need no statistics; with statistics, those that do.
+    pub(crate) fn draw_all(&self, statistics: Option<&Statistics>) -> Drawings {
         let mut drawings = Drawings::default();
-        for name in FigureName::ALL {
-            match self.draw(name) {
+        let is_due = |name: &FigureName| (*name == FigureName::Forest) == statistics.is_some();
+        for name in FigureName::ALL.into_iter().filter(is_due) {
+            match self.draw(name, statistics) {
                 Ok(figure) => drawings.drawn.push((name, figure.remarked(self.remark.as_deref()))),
-                // Most definitions declare no factor, or the traces lack it.
-                Err(FigureError::NoFactor { .. }) => {}
+                // Most definitions declare no factor, or the traces lack it; some studies compare nothing.
+                Err(FigureError::NoFactor { .. } | FigureError::NoComparison { .. }) => {}
                 Err(error) => drawings.left_out.push((name, error)),
             }
         }
@@ -119,12 +124,22 @@ impl<'a> FigureInputs<'a> {
             episodes: Some(&self.results.episodes),
             outcomes: self.results.outcomes.as_ref(),
             timelines: self.results.timelines.as_deref(),
+            statistics: None,
             width: self.width,
         }
     }
 }
 
 impl Drawings {
+    /// Both, in the order of a report.
+    pub(crate) fn and(mut self, others: Self) -> Self {
+        self.drawn.extend(others.drawn);
+        self.drawn.sort_by_key(|(name, _)| *name);
+        self.left_out.extend(others.left_out);
+        self.left_out.sort_by_key(|(name, _)| *name);
+        self
+    }
+
     /// The files of the figures. PNG takes most of the time of a report that has it.
     pub(crate) fn files(&self, threads: NonZeroUsize, png: bool) -> Result<Vec<OutputFile>, StudyError> {
         let mut files = Vec::new();

@@ -36,9 +36,12 @@ pub fn overview(study: &Study, results: Results, style: &str, part: Part) -> Res
     let style = Style::load(style)?;
     let grouped = study.group(Counted::of(results, study.question.lost))?;
     let (results, cells) = (&grouped.counted.results, &grouped.cells);
-    let statistics = (part == Part::Statistics).then(|| statistics(&grouped, &Options::default())).transpose()?;
+    let statistics = (part != Part::Tables).then(|| statistics(&grouped, &Options::default())).transpose()?;
     let drawings = match part {
-        Part::Figures => FigureInputs::of_a_report(results, &style)?.draw_all(),
+        Part::Figures => {
+            let inputs = FigureInputs::of_a_report(results, &style)?;
+            inputs.draw_all(None).and(inputs.draw_all(statistics.as_ref()))
+        }
         Part::Tables | Part::Statistics => Drawings::default(),
     };
     let (tables, lists) = tables(&grouped, &style)?;

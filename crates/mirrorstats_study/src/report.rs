@@ -155,14 +155,20 @@ impl Illustrations {
     fn of(grouped: &Grouped<'_>, style: &Style, png: bool) -> Result<Self, StudyError> {
         thread::scope(|scope| {
             let statistics = scope.spawn(|| statistics(grouped, &Options::default()));
-            let figures = || {
-                let drawings = FigureInputs::of_a_report(&grouped.counted.results, style)?.draw_all();
+            let inputs = FigureInputs::of_a_report(&grouped.counted.results, style)?;
+            let drawn = |statistics: Option<&Statistics>| {
+                let drawings = inputs.draw_all(statistics);
                 let files = drawings.files(grouped.study.threads, png)?;
-                Ok((drawings, files))
+                Ok::<_, StudyError>((drawings, files))
             };
-            let figures = figures();
+            let others = drawn(None);
             let statistics = statistics.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
-            Ok(Self { statistics, figures })
+            let both = drawn(Some(&statistics)).and_then(|(forest, files)| {
+                let (others, mut all) = others?;
+                all.extend(files);
+                Ok((others.and(forest), all))
+            });
+            Ok(Self { statistics, figures: both })
         })
     }
 }

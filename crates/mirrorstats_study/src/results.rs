@@ -33,7 +33,8 @@ impl Outputs {
     /// The inputs of these figures.
     pub fn of_figures(names: &[FigureName]) -> Self {
         let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
-        Self { timelines, outcomes, ..Self::default() }
+        let design = names.contains(&FigureName::Forest);
+        Self { timelines, outcomes, design, ..Self::default() }
     }
 }
 

@@ -29,9 +29,7 @@ pub(crate) fn scan(
 ) -> Result<Results, StudyError> {
     let mut labels = question.labels_over(traces);
     if outputs.design {
-        let is_new = |name: &&str| traces.declares(name) && !labels.iter().any(|label| label == name);
-        let new: Vec<&str> = design::LABELS.into_iter().filter(is_new).collect();
-        labels.extend(new.into_iter().map(str::to_owned));
+        design::add_labels(&mut labels, traces);
     }
     let definitions = question.bind(traces)?;
     let reader = if outputs.quality { QualityReader::of(traces) } else { QualityReader::of_statuses(traces) };

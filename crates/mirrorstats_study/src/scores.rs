@@ -1,12 +1,15 @@
 //! Reads files of scores instead of traces, joins and filters them; and writes them.
 
+use std::collections::HashSet;
 use std::io::Write;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use crate::StudyError;
 use crate::inputs::{InputError, ScoreFile};
 use crate::question::Question;
+use crate::results::Outputs;
+use crate::{Study, StudyError, copies, design};
+use mirrorstats_analysis::comparable::divide_scenes_by_color;
 use mirrorstats_exact::input;
 use mirrorstats_metric::definitions::Definitions;
 use mirrorstats_score::format::{self, Format, Partition};
@@ -14,23 +17,27 @@ use mirrorstats_score::tables::declared_experiments::Declarations;
 use mirrorstats_score::tables::select::select;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::vocabulary;
+use mirrorstats_trace::footers::declared::Declared;
 use mirrorstats_trace::inputs;
 use mirrorstats_trace::read::in_order::in_order;
 
 /// The episodes of some files as one table, filtered by the question.
 pub(crate) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTable, StudyError> {
     let (mut whole, mut declarations) = (None::<EpisodeTable>, Declarations::default());
-    for file in files {
-        let table = read_one(file, question)?;
+    let tables = files.iter().map(|file| read_one(file, question)).collect::<Result<Vec<_>, _>>()?;
+    let declared: Vec<Declared> = tables.iter().map(|table| table.declared.clone()).collect();
+    for (at, (file, mut table)) in files.iter().zip(tables).enumerate() {
         for (name, experiment) in table.catalog.declared() {
             declarations.add(&file.input.name, &name, experiment)?;
         }
+        design::by_file(&mut table, &declared, |_| Some(at));
         whole = Some(match whole {
             None => table,
             Some(whole) => whole.joined(&table).map_err(|error| InputError::unreadable(&file.input, error))?,
         });
     }
-    let table = whole.ok_or(InputError::NoScores)?;
+    let mut table = whole.ok_or(InputError::NoScores)?;
+    divide_scenes_by_color(&mut table);
     Ok(select(table, question.metrics.as_deref(), question.filter.as_deref())?)
 }
 
@@ -66,6 +73,21 @@ fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTa
         found_hash: short(&table.catalog.hash),
     }
     .into())
+}
+
+/// The episode table as a file keeps it: with the labels of the design and the hashes of the steps. Errors: as
+/// [`Study::score`].
+pub fn score(study: &Study) -> Result<EpisodeTable, StudyError> {
+    for_a_file(study, study.scan(Outputs { design: true, ..Outputs::default() })?.episodes)
+}
+
+pub(crate) fn for_a_file(study: &Study, mut table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
+    design::remove_plain_labels(&mut table, &study.question.labels());
+    let kept: HashSet<&str> = table.keys.iter().map(|key| key.episode_id).collect();
+    let mut steps = copies::steps(study, &table)?;
+    steps.retain(|episode, _| kept.contains(episode.as_str()));
+    table.declared.steps = steps;
+    Ok(table)
 }
 
 pub fn write(

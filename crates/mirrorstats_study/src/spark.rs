@@ -7,7 +7,7 @@ use crate::inputs::InputError;
 use crate::own_definitions::check_scored;
 use crate::question::Question;
 use crate::results::{Outputs, Results};
-use crate::{Study, StudyError, scan};
+use crate::{Study, StudyError, design, scan, scores};
 use mirrorstats_engines::spark::source::{Sources, is_uri};
 use mirrorstats_engines::spark::{self, Cluster, Job, SparkError, Written};
 use mirrorstats_exact::replace::check_target;
@@ -71,11 +71,16 @@ impl SparkJob {
     }
 }
 
-/// The episode table, computed by Spark. Lost episodes, which Spark does not know, come from a scan. Errors: as
+/// The episode table, computed by Spark, and with `for_a_file` as a file keeps it ([`scores::score`](crate::scores::score)). Lost episodes, which
+/// Spark does not know, and hashes of steps come from a scan. Errors: as
 /// [`Study::score`]; scores in the place of traces; faults of Spark.
-pub fn score_on(study: &Study, cluster: Cluster) -> Result<EpisodeTable, StudyError> {
+pub fn score_on(study: &Study, cluster: Cluster, for_a_file: bool) -> Result<EpisodeTable, StudyError> {
     let traces = study.traces()?;
-    let episodes = SparkJob::of_study(study, cluster)?.score()?;
+    let mut job = SparkJob::of_study(study, cluster)?;
+    if for_a_file {
+        design::add_labels(&mut job.labels, traces);
+    }
+    let episodes = job.score()?;
     check_scored(&study.question.bind(traces)?, traces, &episodes)?;
     let mut results = Results::of(episodes);
     if traces.column(REPLY_STATUS).is_some() {
@@ -84,7 +89,7 @@ pub fn score_on(study: &Study, cluster: Cluster) -> Result<EpisodeTable, StudyEr
     }
     study.check_unchanged()?;
     study.declare(&mut results)?;
-    Ok(results.episodes)
+    if for_a_file { scores::for_a_file(study, results.episodes) } else { Ok(results.episodes) }
 }
 
 /// Returns true if all arguments are URIs, false if none is.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use indexmap::IndexMap;
+use mirrorstats_analysis::statistics::{Options, Statistics};
 use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::ratio::Ratio;
@@ -29,6 +30,8 @@ pub struct Cast {
     pub episodes: EpisodeTable,
     pub outcomes: Outcomes,
     pub timelines: Vec<Timeline>,
+    /// Of TSA alone.
+    pub statistics: Statistics,
 }
 
 impl Cast {
@@ -37,6 +40,7 @@ impl Cast {
             episodes: Some(&self.episodes),
             outcomes: Some(&self.outcomes),
             timelines: Some(&self.timelines),
+            statistics: Some(&self.statistics),
             ..Input::of_cells(&self.cells)
         }
     }
@@ -45,7 +49,8 @@ impl Cast {
         let episodes = episodes(&cells);
         let timelines = timelines(&episodes);
         let outcomes = outcomes(&cells);
-        Self { cells, episodes, outcomes, timelines }
+        let statistics = statistics(&cells, &episodes);
+        Self { cells, episodes, outcomes, timelines, statistics }
     }
 
     /// The cast without the groups for which `is_gone` is true.
@@ -213,6 +218,25 @@ fn episodes(cells: &Cells) -> EpisodeTable {
         declared: Declared::default(),
         metrics: vec![column("TTD", ttd), column("TSA-C", finished)],
     }
+}
+
+/// As many successes as TSA has in each group.
+fn statistics(cells: &Cells, episodes: &EpisodeTable) -> Statistics {
+    let mut sums = BTreeMap::new();
+    for group in &cells.groups {
+        sums.insert(group.key.iter().map(ToString::to_string).collect::<Vec<_>>(), group.moments[0].sum);
+    }
+    let mut seen: BTreeMap<Vec<String>, i128> = BTreeMap::new();
+    let value = |key: KeyRef<'_>| {
+        let key = vec![key.experiment.to_owned(), key.model.to_owned()];
+        let (sum, count) = (sums[&key], seen.entry(key).or_default());
+        *count += 1;
+        Some(i64::from(*count <= sum))
+    };
+    let values: Vec<Option<i64>> = episodes.keys.iter().map(value).collect();
+    let metrics = vec![MetricColumn::new("TSA", values)];
+    let table = EpisodeTable { metrics, ..episodes.clone() };
+    Statistics::from_table(&table, cells, &Options::default()).unwrap()
 }
 
 fn timelines(episodes: &EpisodeTable) -> Vec<Timeline> {

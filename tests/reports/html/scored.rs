@@ -67,6 +67,7 @@ impl Report {
         report.statistics = Some(Statistics::from_table(&report.episodes, &report.cells, &Options::default()).unwrap());
         let input = mirrorstats_figures::Input {
             episodes: Some(&report.episodes),
+            statistics: report.statistics.as_ref(),
             ..mirrorstats_figures::Input::of_cells(&report.cells)
         };
         let drawn = FigureName::ALL

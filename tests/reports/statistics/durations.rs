@@ -102,6 +102,11 @@ fn the_limits_follow_from_the_simulated_coverage() {
         ("Welch's t, unlike", coverage::WELCH),
         ("steps, t(clusters - 1)", coverage::CLUSTERS),
         ("a rate, t(clusters - 1)", coverage::CLUSTERS),
+        ("shared units, alike", coverage::UNITS),
+        ("shared units, unlike", coverage::UNITS),
+        ("units of one side, alike", coverage::UNITS),
+        ("units of one side, n against 4 n, unlike", coverage::UNITS),
+        ("half of them shared, unlike", coverage::UNITS),
     ] {
         let row = format!("| {method} | ");
         let at = simulated.find(&row).unwrap_or_else(|| panic!("no row of {method}"));

@@ -121,8 +121,8 @@ fn unranked(statistics: &Statistics) -> Vec<Answer> {
         let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
         let is_tested = overall.iter().any(|row| row.p.is_some());
         // If no experiment could show a difference, a missing difference over all of them is no answer either.
-        let is_unsayable = !overall.iter().any(|row| row.separated)
-            && families.clone().all(|family| unsayable(family, confidence).is_some());
+        let is_unsayable =
+            !overall.iter().any(|row| row.separated) && families.clone().all(|family| family.cannot_say(confidence));
         let unsettled = overall.iter().filter(|row| row.losses.is_some_and(|losses| !losses.agree));
         let unsettled: Vec<String> = unsettled.map(|_| LOST.to_owned()).collect();
         let overall = match (overall.len(), is_tested) {
@@ -157,9 +157,13 @@ fn opposite(overall: &[&OverallRow]) -> String {
         let others = if crossed.len() > 1 { format!(" and {} more", crossed.len() - 1) } else { String::new() };
         format!(", cannot say for {} and {}{others}: opposite in {}", row.first, row.second, row.opposite.join(", "))
     });
-    let against = overall.iter().filter(|row| row.separated && !row.opposite.is_empty());
-    let against =
-        against.map(|row| format!(", {} and {} the other way in {}", row.first, row.second, row.opposite.join(", ")));
+    let mut against: IndexMap<(&str, &[String]), Vec<&str>> = IndexMap::new();
+    for row in overall.iter().filter(|row| row.separated && !row.opposite.is_empty()) {
+        against.entry((&row.first, &row.opposite)).or_default().push(&row.second);
+    }
+    let against = against.iter().map(|((first, experiments), seconds)| {
+        format!(", {first} and {} the other way in {}", seconds.join(", "), experiments.join(", "))
+    });
     withheld.into_iter().chain(against.take(MOST_NAMED)).collect()
 }
 
@@ -268,9 +272,8 @@ fn cannot_say(units: &Units) -> String {
 /// The reason why these comparisons cannot show a difference; `None` if any can.
 fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     let unsaid = |found: &Comparison| found.unsaid(confidence);
-    let is_tried = |found: &&&Comparison| {
-        found.incomparable.is_none() && (found.p.is_some() || found.units.is_some() || unsaid(found).is_some())
-    };
+    let is_tried =
+        |found: &&&Comparison| found.incomparable.is_none() && (found.p.is_some() || unsaid(found).is_some());
     let mut tested = comparisons.iter().filter(is_tried).peekable();
     if tested.peek().is_none() {
         let selected = comparisons.iter().find_map(|found| found.selected.as_ref());
@@ -287,6 +290,13 @@ fn apart(comparisons: &[&Comparison]) -> Option<String> {
     let (count, all) = (settings.len(), comparisons.len());
     let count = if count == all { String::new() } else { format!("{count} of {all} ") };
     Some(format!("{count}not comparable ({setting})"))
+}
+
+impl Family {
+    /// Returns true if none of the comparisons could have shown a difference.
+    pub fn cannot_say(&self, confidence: f64) -> bool {
+        unsayable(self, confidence).is_some()
+    }
 }
 
 fn unsayable(family: &Family, confidence: f64) -> Option<String> {
@@ -398,8 +408,7 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
     }
     let is_silent = |it: &Comparison| it.sign().is_none() && it.incomparable.is_none();
     let silent = group.iter().filter(|contrast| is_silent(&contrast.comparison));
-    let (unsaid, shown): (Vec<&&Contrast>, Vec<_>) =
-        silent.partition(|it| it.comparison.p.is_none() || it.comparison.unsaid(confidence).is_some());
+    let (unsaid, shown): (Vec<&&Contrast>, Vec<_>) = silent.partition(|it| it.comparison.cannot_say(confidence));
     let reach = || at_least(reach(&comparisons, confidence));
     let unshown = match (shown.len(), group.len()) {
         (0, _) => None,

@@ -127,6 +127,7 @@ impl DesignAudit {
             for group in compared(experiment) {
                 audit.budgets(&group);
                 audit.most_different(&group, Touched::Models, Audit::seeds);
+                audit.most_different(&group, Touched::Models, Audit::shared_scenes);
                 audit.most_different(&group, Touched::Models, Audit::drivers);
             }
         }

@@ -24,6 +24,7 @@ pub(crate) enum Swatch {
     /// A ring with this radius, px.
     Ring(f64),
     Dot(Fill),
+    Cross,
     /// No sign: a note.
     None,
 }
@@ -149,7 +150,15 @@ fn draw_swatch(sheet: &mut Sheet, swatch: Swatch, frame: Frame) {
         Swatch::Tick(stroke) => sheet.line(&[(center.0, frame.top), (center.0, frame.bottom())], stroke),
         Swatch::Ring(radius) => sheet.circle(center, radius, Fill::outlined(surface.paper, surface.axis, 1.0)),
         Swatch::Dot(fill) => sheet.circle(center, 3.0, fill),
+        Swatch::Cross => cross(sheet, center),
         Swatch::None => {}
+    }
+}
+
+/// A small cross: no verdict.
+pub fn cross(sheet: &mut Sheet, (x, y): Point) {
+    for turn in [2.6, -2.6] {
+        sheet.line(&[(x - 2.6, y - turn), (x + 2.6, y + turn)], Stroke::solid(PALETTE.surface.quiet, 1.2));
     }
 }
 

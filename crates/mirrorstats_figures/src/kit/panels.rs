@@ -45,6 +45,20 @@ impl Grid {
     /// A sheet with a panel for each of `names`, with a title of up to two lines if `titles` has one. A panel has
     /// `height` px below its heading.
     pub(crate) fn panels(self, names: &[&str], titles: &[&str], height: f64) -> (Sheet, Panels) {
+        let mut sheet = Sheet::new(self.width);
+        let panels = self.panels_below(&mut sheet, MARGIN, names, titles, height);
+        (sheet, panels)
+    }
+
+    /// The same on a sheet, from `top` on.
+    pub(crate) fn panels_below(
+        self,
+        sheet: &mut Sheet,
+        top: f64,
+        names: &[&str],
+        titles: &[&str],
+        height: f64,
+    ) -> Panels {
         let Self { width, left, gap, columns } = self;
         let panel = self.panel();
         let title = |at: usize| title_lines(titles.get(at).unwrap_or(&""), panel);
@@ -53,8 +67,7 @@ impl Grid {
         let (heading, line) = (leading(lettering::heading()), leading(lettering::tick()));
         let head = heading + line * many(most) + 6.0;
         let row_height = head + height + 14.0;
-        let corner = |at: usize| (left + (panel + gap) * many(at % columns), MARGIN + row_height * many(at / columns));
-        let mut sheet = Sheet::new(width);
+        let corner = |at: usize| (left + (panel + gap) * many(at % columns), top + row_height * many(at / columns));
         let mut bodies = Vec::with_capacity(names.len());
         let headings = label::fitted(names, panel, lettering::heading());
         for (at, (name, title)) in headings.iter().zip(&titles).enumerate() {
@@ -70,8 +83,8 @@ impl Grid {
         let (x, y) = corner(names.len());
         let rest = Frame::new(x, y, width - MARGIN - x, head + height);
         let rest = (!names.len().is_multiple_of(columns)).then_some(rest);
-        let bottom = MARGIN + row_height * many(names.len().div_ceil(columns)) - 14.0;
-        (sheet, Panels { bodies, bottom, rest })
+        let bottom = top + row_height * many(names.len().div_ceil(columns)) - 14.0;
+        Panels { bodies, bottom, rest }
     }
 }
 

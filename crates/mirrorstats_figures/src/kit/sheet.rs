@@ -115,6 +115,11 @@ impl Fill {
         Self { color, opacity: 1.0, outline: None }
     }
 
+    /// A colour that others show through.
+    pub(crate) const fn faint(color: Rgb) -> Self {
+        Self { color, opacity: 0.12, outline: None }
+    }
+
     pub(crate) const fn outlined(color: Rgb, outline: Rgb, width: f64) -> Self {
         Self { color, opacity: 1.0, outline: Some((outline, width)) }
     }

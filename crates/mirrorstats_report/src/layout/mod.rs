@@ -121,10 +121,18 @@ impl<'a> Layout<'a> {
         if cells().any(|cell| cell.is_marked) {
             notes.push(format!("{DAGGER} defined in fewer than {} episodes.", self.print.mark_n_below));
         }
-        if cells().any(|cell| matches!(cell.value, Value::Mean { spread: Spread::Unknown, .. })) {
+        let is_few =
+            |value: &Value| matches!(value, Value::Mean { spread: Spread::Unknown, n: Some(n), .. } if *n < STUDENT);
+        if cells().any(|cell| is_few(&cell.value)) {
             notes.push(format!(
                 "A mean of fewer than {STUDENT} episodes has no interval: it would miss the truth too often."
             ));
+        }
+        if cells().any(|cell| matches!(cell.value, Value::Count { spread: Spread::Unknown, .. })) {
+            notes.push(
+                "Episodes that share a scene, seed or participant have no interval here; `stats` has intervals over those units."
+                    .to_owned(),
+            );
         }
         notes
     }

@@ -121,9 +121,9 @@ struct DeclaredText {
 }
 
 impl DeclaredText {
-    /// The text of a table in CSV or JSON Lines; `None` if the traces declare nothing.
+    /// The text of a table in CSV or JSON Lines, without the hashes of steps; `None` if the traces declare nothing.
     fn of_table(table: &EpisodeTable) -> Result<Option<String>, FormatError> {
-        let declared = table.declared.clone();
+        let declared = Declared { steps: BTreeMap::new(), ..table.declared.clone() };
         Self { declared, experiments: table.catalog.declared().collect() }.text()
     }
 

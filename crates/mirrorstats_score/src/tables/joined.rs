@@ -71,5 +71,5 @@ impl EpisodeTable {
 }
 
 fn may_be_absent(label: &str) -> bool {
-    [LOST, UNUSABLE_REPLIES].contains(&label) || schema::column(label).is_some_and(|column| !column.required)
+    [LOST, UNUSABLE_REPLIES].contains(&label) || schema::column(label).is_some()
 }

@@ -159,18 +159,24 @@ impl Survival {
         RestrictedMean::of(horizon, area + later as f64, variance, n, confidence)
     }
 
-    /// The possible steps of the median (Brookmeyer and Crowley 1982): one half is in the pointwise interval of the
-    /// curve there, Greenwood's after the transformation log(-log) (Borgan and Liestol 1990). `None` if not even the
-    /// lower bound is observed, and for a confidence outside (0, 1).
-    pub fn median_interval(&self, confidence: f64) -> Option<MedianInterval> {
-        let z = quantile::normal(quantile::tail(confidence)?);
-        let (mut sum, mut low) = (0.0, None);
-        for point in &self.points {
+    /// The pointwise interval of the share undecided after each step, Greenwood's after the transformation log(-log)
+    /// (Borgan and Liestol 1990). Once all are decided, the share is below the last bounds by an unknown amount: 0 to 1.
+    /// `None` for a confidence outside (0, 1).
+    pub fn bounds(&self, confidence: f64) -> Option<Vec<Interval>> {
+        let (z, mut sum) = (quantile::normal(quantile::tail(confidence)?), 0.0);
+        let of_point = |point: &Point| {
             let (at_risk, decided) = (point.at_risk as f64, point.decided as f64);
             sum += decided / (at_risk * (at_risk - decided));
-            // Once all are decided the curve is 0, below one half by an unknown amount: its interval is undefined.
-            let bounds =
-                if point.undecided > 0.0 { log_log(point.undecided, sum, z) } else { Interval { low: 0.0, high: 1.0 } };
+            if point.undecided > 0.0 { log_log(point.undecided, sum, z) } else { Interval { low: 0.0, high: 1.0 } }
+        };
+        Some(self.points.iter().map(of_point).collect())
+    }
+
+    /// The possible steps of the median (Brookmeyer and Crowley 1982): one half is in the pointwise interval of the
+    /// curve there. `None` if not even the lower bound is observed, and for a confidence outside (0, 1).
+    pub fn median_interval(&self, confidence: f64) -> Option<MedianInterval> {
+        let mut low = None;
+        for (point, bounds) in self.points.iter().zip(self.bounds(confidence)?) {
             low = low.or((bounds.low <= HALF).then_some(point.steps));
             if bounds.high <= HALF {
                 return low.map(|low| MedianInterval { low, high: Some(point.steps) });
@@ -213,6 +219,23 @@ mod tests {
 
     fn close(found: f64, expected: f64) {
         assert!((found - expected).abs() < 1e-10 * expected, "found {found}, expected {expected}");
+    }
+
+    // lifelines 0.30.3: KaplanMeierFitter(alpha=0.05).fit(T, E).confidence_interval_
+    #[test]
+    fn bounds_of_the_curve_are_those_of_greenwood_and_log_log() {
+        let curve = curve(&REMISSIONS);
+        let bounds = curve.bounds(0.95).unwrap();
+        for (t, low, high) in [
+            (6, 0.6197179552659838, 0.9515517476469969),
+            (10, 0.5031995107999564, 0.8893618351692651),
+            (23, 0.18805200595923233, 0.6801426284952412),
+        ] {
+            let at = curve.points.iter().position(|point| point.steps == t).unwrap();
+            close(bounds[at].low, low);
+            close(bounds[at].high, high);
+        }
+        assert_eq!(curve.bounds(1.0), None);
     }
 
     // lifelines 0.30.3: KaplanMeierFitter().fit(T, E).survival_function_, median_survival_time_

@@ -42,6 +42,16 @@ pub struct Registration {
     pub definitions: Option<String>,
 }
 
+/// What happened in an episode, without its names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StepHashes {
+    /// Equal for episodes with equal steps.
+    pub print: (u64, u64),
+    /// The first latencies in milliseconds; empty if they are not recorded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub latencies: Vec<i64>,
+}
+
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Declared {
     /// The origin of the rows, if all files declare the same; a reconstruction if any file is one.
@@ -68,12 +78,19 @@ pub struct Declared {
     /// True if every file lists its lost episodes.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub losses_recorded: bool,
+    /// The steps of each episode as hashes, by its id, so that copies are found among scores too. Traces have the steps.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub steps: BTreeMap<String, StepHashes>,
 }
 
 impl Declared {
     pub fn from_traces(traces: &TraceSet) -> Self {
-        let recordings = traces.files().iter().map(|file| Self::of_recording(&file.recording()));
-        recordings.reduce(Self::joined).unwrap_or_default()
+        Self::of_files(traces).reduce(Self::joined).unwrap_or_default()
+    }
+
+    /// The declarations of each file.
+    pub fn of_files(traces: &TraceSet) -> impl Iterator<Item = Self> {
+        traces.files().iter().map(|file| Self::of_recording(&file.recording()))
     }
 
     fn of_recording(recording: &Value) -> Self {
@@ -100,6 +117,7 @@ impl Declared {
         self.unrecorded.extend(other.unrecorded);
         self.unrecorded.sort();
         self.unrecorded.dedup();
+        self.steps.extend(other.steps);
         let made_up = [self.origin, other.origin].into_iter().flatten().find(|it| *it == Origin::Reconstruction);
         Self {
             origin: self.origin.filter(|origin| other.origin == Some(*origin)).or(made_up),

@@ -2,7 +2,7 @@
 //!
 //! A copy counts as an independent episode in every number, so it makes results look more certain than they are.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZeroUsize;
 use std::ops::Range;
 
@@ -12,6 +12,7 @@ use arrow::datatypes::{DataType, Int64Type};
 
 use crate::episodes::episode_hash::EPISODE_HASH;
 use crate::error::TraceError;
+use crate::footers::declared::StepHashes;
 use crate::read::open::TraceSet;
 use crate::read::parallel_scan::{Episodes, ScanEvent, pass};
 use crate::read::projection::{EPISODE_ID, Layout};
@@ -41,18 +42,8 @@ const LATENCY: &str = "latency_ms";
 /// Latencies that are kept of each episode; more do not distinguish better.
 const LATENCIES: usize = 16;
 
-/// What happened in an episode, without its names.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Decisive {
-    pub episode: String,
-    /// Equal for episodes with equal steps.
-    pub print: (u64, u64),
-    /// The first latencies in milliseconds; empty if they are not recorded.
-    pub latencies: Vec<i64>,
-}
-
-/// The decisive columns of every episode, in the order of the files.
-pub fn decisive(set: &TraceSet, threads: NonZeroUsize) -> Result<Vec<Decisive>, TraceError> {
+/// The decisive columns of every episode, by its id.
+pub fn decisive(set: &TraceSet, threads: NonZeroUsize) -> Result<BTreeMap<String, StepHashes>, TraceError> {
     let is_plain = |name: &&str| {
         *name != EPISODE_HASH
             && (*name == LATENCY || !NOT_DECISIVE.contains(name))
@@ -77,11 +68,11 @@ pub fn decisive(set: &TraceSet, threads: NonZeroUsize) -> Result<Vec<Decisive>, 
         };
         let prints = of(1).into_iter().zip(of(2));
         let each = rows.iter().zip(prints).filter_map(|(rows, print)| {
-            Some(Decisive { episode: episodes.id(rows.start)?.to_owned(), print, latencies: latencies(rows) })
+            Some((episodes.id(rows.start)?.to_owned(), StepHashes { print, latencies: latencies(rows) }))
         });
         each.collect::<Vec<_>>()
     };
-    let mut found = Vec::new();
+    let mut found = BTreeMap::new();
     pass(set.files(), &layout, threads, &work, |_, event| {
         match event {
             ScanEvent::Whole(episodes) => found.extend(episodes),

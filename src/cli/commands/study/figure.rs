@@ -10,7 +10,7 @@ use mirrorstats_study::figure::{FigureOptions, MANY_MODELS, figure};
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FigureArgs {
-    /// The figure: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, slopes, dose-response,
+    /// The figure: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, forest, slopes, dose-response,
     /// decision-curve, gaze
     #[arg(value_name = "NAME")]
     pub name: FigureName,

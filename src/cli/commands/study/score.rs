@@ -95,7 +95,7 @@ impl ScoreArgs {
         if let Some(episode) = &self.explain {
             return output::print(&explain(&study, episode)?, self.json);
         }
-        let table = study.score()?.episodes;
+        let table = if self.output.is_some() { scores::score(&study)? } else { study.score()?.episodes };
         self.deliver(&table, format)?;
         output::notes(study.empty_filter(table.len())?.as_slice());
         Ok(Outcome::Done)
@@ -111,7 +111,7 @@ impl ScoreArgs {
         if folder.is_none() && !are_uris(&self.traces.traces)? {
             let study = self.study()?;
             self.check_target(study.files_read(None))?;
-            self.deliver(&score_on(&study, cluster)?, format)?;
+            self.deliver(&score_on(&study, cluster, self.output.is_some())?, format)?;
             return Ok(Outcome::Done);
         }
         let job = self.job(cluster)?;

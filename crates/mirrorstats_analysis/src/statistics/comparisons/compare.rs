@@ -469,6 +469,11 @@ impl Comparison {
         hopeless.or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
 
+    /// Returns true if no outcome of these units could be a verdict, or there is no test.
+    pub fn cannot_say(&self, confidence: f64) -> bool {
+        self.p.is_none() || self.unsaid(confidence).is_some()
+    }
+
     /// The sign of a shown difference; `None` if no difference is shown.
     pub fn sign(&self) -> Option<Sign> {
         let difference = self.difference.filter(|_| self.separated)?;

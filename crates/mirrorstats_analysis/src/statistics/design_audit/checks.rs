@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{ALL, DesignCheck, DesignFinding, OF_MODELS, Touched};
 use crate::comparable::{BODY_COLOR, Budget, ORIGIN, REPETITION};
-use crate::statistics::Replies;
 use crate::statistics::comparisons::matching::singular;
 use crate::statistics::rates::durations::{decided, is_duration};
+use crate::statistics::{FEW, Replies};
 use crate::study::{Block, PARTICIPANT, RowKey, SCENE, Study};
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_metric::catalogs::catalog::Better;
@@ -248,6 +248,14 @@ impl Audit<'_, '_> {
         else {
             return;
         };
+        for (block, ends) in &ends {
+            // Silence is below chance without a wrong guess.
+            if ends.episodes >= FEW && ends.unfinished.values().sum::<u64>() == ends.episodes {
+                let all = counted(ends.episodes, "episode");
+                let finding = format!("{} {}: no decision made in {all}", block.experiment, name(block));
+                self.find(DesignCheck::Budgets, &[Touched::Levels], finding);
+            }
+        }
         for (block, ends) in ends.iter().filter(|(_, ends)| ends.is_cut()) {
             let steps = ends.unfinished.keys().next().zip(ends.unfinished.keys().last());
             let steps = steps.map_or_else(String::new, |(first, last)| {
@@ -314,6 +322,14 @@ impl Audit<'_, '_> {
         };
         let finding = format!("{names} are divided unequally among seeds (seed {seed}: {} and {})", of(0), of(1));
         (shift > LARGEST_SHIFT).then_some((shift, DesignCheck::Seeds, finding))
+    }
+
+    pub fn shared_scenes(&self, [first, second]: [&Block; 2]) -> Option<Difference> {
+        let [one, other] = [first, second].map(|block| by_label(self.study, block, SCENE));
+        let is_shared = one.is_empty() || other.is_empty() || one.keys().any(|scene| other.contains_key(scene));
+        let finding = format!("{}: {} and {} share no scene", first.experiment, name(first), name(second));
+        let is_made_up = self.study.design.kind == Some(DesignKind::Reconstruction);
+        (!is_shared && !is_made_up).then_some((0.0, DesignCheck::Scenes, finding))
     }
 
     pub fn drivers(&self, [first, second]: [&Block; 2]) -> Option<Difference> {

@@ -164,6 +164,11 @@ fn lasting(output: &str) -> String {
     let output = &progress.replace_all(output, "");
     let took = Regex::new(r"in [0-9.]+ m?s\b( \([^)]*\))?").unwrap();
     let output = &Regex::new(r"\b[1-9A-HJ-NP-Za-km-z]{22}\b").unwrap().replace_all(output, "[an id]");
+    // The renderer's name ends with what it uses of the processor, which is another one on other machines.
+    let processor = Regex::new(r"x86_64 sse4[a-z0-9 .]*").unwrap();
+    let output = &processor.replace_all(output, "[a processor]");
+    let others = Regex::new("(?m)^different renderers: .*\n").unwrap();
+    let output = &others.replace_all(output, "");
     took.replace_all(output, "in [a time]").into_owned()
 }
 

@@ -142,6 +142,9 @@ pub fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
     }
+    if is_bundle(path) {
+        return traces_at(&path.join("traces"));
+    }
     let failed = |source| TraceError::Read { what: path.display().to_string(), source };
     let mut traces = Vec::new();
     for entry in fs::read_dir(path).map_err(failed)? {
@@ -179,6 +182,11 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
 /// Returns true if `mirrorstats report` wrote the folder: its Parquet file holds scores, not steps.
 pub fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
+}
+
+/// Returns true if `mirrorstats publish` wrote the folder: its steps are in `traces`.
+fn is_bundle(folder: &Path) -> bool {
+    folder.join("croissant.json").is_file() && folder.join("manifest.json").is_file() && folder.join("traces").is_dir()
 }
 
 /// The value that marks null in the name of a folder.

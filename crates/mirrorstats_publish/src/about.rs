@@ -43,6 +43,8 @@ pub struct About {
     pub synthetic: Option<bool>,
     /// What the data was derived from, as addresses.
     pub derived_from: Vec<String>,
+    /// The time of the evaluation, seconds since 1970; Every Eval Ever asks for it.
+    pub time: Option<u64>,
     /// How the data was made.
     pub generated_by: Option<String>,
 }

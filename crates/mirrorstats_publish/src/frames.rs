@@ -12,6 +12,7 @@ use arrow::array::{
     Array as _, ArrayRef, AsArray, BinaryBuilder, Int32Array, RecordBatch, StringArray, StringBuilder, StructArray,
 };
 use arrow::datatypes::{DataType, Field, Fields, Int32Type, Schema};
+use mirrorstats_exact::format::counted;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::replace::make_folder;
 use mirrorstats_log::LogError;
@@ -52,6 +53,7 @@ pub(crate) fn write_frames(
     notes: &mut Vec<String>,
 ) -> Result<(), PublishError> {
     let folder = out.join(FRAMES);
+    let mut without = 0;
     for input in inputs(base)? {
         let name = input.path.file_name().unwrap_or_default().to_owned();
         let log = input.path.with_extension("mcap");
@@ -72,11 +74,14 @@ pub(crate) fn write_frames(
             format!("{FRAMES}/{}", name.to_string_lossy())
         };
         if pictures.is_empty() {
-            notes.push(format!("no frames of {}: no log of them is beside it", input.name));
+            without += 1;
             continue;
         }
         make_folder(&folder).map_err(PublishError::file(&folder))?;
         write_table(&folder.join(&name), &source, &episodes, pictures)?;
+    }
+    if without > 0 {
+        notes.push(format!("no frames of {}: no log with them is beside", counted(without, "trace")));
     }
     Ok(())
 }

@@ -18,6 +18,7 @@ mod card;
 mod compare;
 mod croissant;
 mod derive;
+pub mod formats;
 mod frames;
 mod manifest;
 mod sources;

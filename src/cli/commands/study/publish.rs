@@ -10,7 +10,9 @@ use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
 use mirrorstats_publish::about::About;
+use mirrorstats_publish::formats::{self, ExportFormat};
 use mirrorstats_publish::{Frames, PublishRequest, Withheld, publish};
+use mirrorstats_study::Study;
 
 /// Publish a study: one folder that others open, check and cite
 ///
@@ -20,7 +22,7 @@ use mirrorstats_publish::{Frames, PublishRequest, Withheld, publish};
 ///
 /// --about names a TOML file. Its keys, all optional: `title`, `authors`, `license` (SPDX), `url`, `doi`,
 /// `description`, `tags`, `limitations`, `biases`, `personal`, `uses`, `impact`, `synthetic`, `derived_from`,
-/// `generated_by`.
+/// `generated_by`, `time` (of the evaluation, seconds since 1970).
 #[derive(Clone, Debug, clap::Args)]
 pub struct PublishArgs {
     #[command(flatten)]
@@ -28,6 +30,9 @@ pub struct PublishArgs {
     /// The folder to write
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
+    /// The form of the folder
+    #[arg(long, value_enum, default_value_t)]
+    pub format: FormatArg,
     /// The frames of the logs beside the traces
     #[arg(long, value_enum, default_value_t)]
     pub frames: FramesArg,
@@ -47,6 +52,17 @@ pub struct PublishArgs {
     /// Print what was written as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum FormatArg {
+    /// Everything, as described above
+    #[default]
+    Bundle,
+    /// Results with intervals and a line per episode and rate, for Every Eval Ever 0.3
+    EveryEvalEver,
+    /// A row per episode with its messages, for Inspect Scout
+    InspectScout,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -77,10 +93,26 @@ pub struct PublishAnswer {
     pub notes: Vec<String>,
 }
 
+/// The answer for a program, of another format than a bundle.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ExportAnswer {
+    /// The folder, as typed.
+    pub out: String,
+    /// The files in it.
+    pub files: Vec<String>,
+    /// What the format cannot hold.
+    pub left_out: Vec<String>,
+}
+
 impl PublishArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let about = self.about.as_deref().map(About::read).transpose()?.unwrap_or_default();
         let study = self.traces.study(&self.scoring, &self.grouping)?;
+        match self.format {
+            FormatArg::Bundle => {}
+            FormatArg::EveryEvalEver => return self.export(&study, ExportFormat::EveryEvalEver, &about),
+            FormatArg::InspectScout => return self.export(&study, ExportFormat::InspectScout, &about),
+        }
         let frames = match self.frames {
             FramesArg::None => Frames::None,
             FramesArg::Decisive => Frames::Decisive,
@@ -115,6 +147,21 @@ impl PublishArgs {
         let (files, episodes) = (counted(answer.files as u64, "file"), counted(answer.episodes as u64, "episode"));
         output::say(&format!("{files}, {episodes}; the bundle is in {}", answer.out));
         output::say(&format!("next: `mirrorstats verify {}` computes everything again", answer.out));
+        Ok(Outcome::Done)
+    }
+}
+
+impl PublishArgs {
+    fn export(&self, study: &Study, format: ExportFormat, about: &About) -> Result<Outcome, Failure> {
+        let (files, left_out) = formats::export(study, format, about, &self.out, &progress)?;
+        let out = self.out.display().to_string();
+        if self.json {
+            return output::print_json(&ExportAnswer { out, files, left_out });
+        }
+        for what in &left_out {
+            output::note(&format!("the format cannot hold {what}"));
+        }
+        output::say(&format!("{} in {out}", counted(files.len() as u64, "file")));
         Ok(Outcome::Done)
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct Card<'c> {
     pub episodes: usize,
     /// The main table as Markdown.
     pub table: &'c str,
+    /// Whether episodes of one scene are pairs; `None` without scenes.
+    pub pairs: Option<&'c str>,
     pub traces: &'c TraceSet,
 }
 
@@ -50,6 +52,9 @@ impl Card<'_> {
         let mut text = format!("---\n{}---\n\n# {}\n\n{}\n\n", yaml(&front), about.title(), about.description());
         let episodes = counted(self.episodes as u64, "episode");
         let _ = writeln!(text, "{episodes}, {}.\n\n## Results\n\n{}\n", counted(rows, "step"), self.table.trim_end());
+        if let Some(pairs) = self.pairs {
+            let _ = writeln!(text, "Comparisons by scene: {pairs}.\n");
+        }
         text.push_str(LAYOUT);
         let names: &[&str] = if has_frames { &["episodes", "steps", "frames"] } else { &["episodes", "steps"] };
         text.push_str("\n## Load\n\n```python\nfrom datasets import load_dataset\n\n");
@@ -77,10 +82,8 @@ impl Card<'_> {
             let names = list(&folder)?.into_iter().filter(|name| name.ends_with(".parquet"));
             Ok(names.map(|name| folder.join(name)).collect())
         };
-        let mut configs = vec![
-            ("episodes", vec![self.out.join("scores.parquet")]),
-            ("steps", inside(self.base, TRACES)?),
-        ];
+        let mut configs =
+            vec![("episodes", vec![self.out.join("scores.parquet")]), ("steps", inside(self.base, TRACES)?)];
         if self.has_frames() {
             configs.push((FRAMES, inside(self.out, FRAMES)?));
         }
@@ -131,7 +134,8 @@ fn features(config: &str, files: &[std::path::PathBuf]) -> Result<Value, Publish
     let mut features: Vec<Value> = Vec::new();
     for path in files {
         let file = File::open(path).map_err(PublishError::file(path))?;
-        let refused = |error: parquet::errors::ParquetError| PublishError::Refused(format!("{}: {error}", path.display()));
+        let refused =
+            |error: parquet::errors::ParquetError| PublishError::Refused(format!("{}: {error}", path.display()));
         for field in ParquetRecordBatchReaderBuilder::try_new(file).map_err(refused)?.schema().fields() {
             if features.iter().any(|known| known["name"] == *field.name()) {
                 continue;

@@ -94,7 +94,9 @@ fn json(old: &[u8], new: &[u8]) -> Vec<Cell> {
     fn flat(value: &Value, place: &str, into: &mut BTreeMap<String, String>) {
         match value {
             Value::Object(map) => map.iter().for_each(|(key, value)| flat(value, &format!("{place}/{key}"), into)),
-            Value::Array(list) => list.iter().zip(0..).for_each(|(value, at)| flat(value, &format!("{place}/{at}"), into)),
+            Value::Array(list) => {
+                list.iter().zip(0..).for_each(|(value, at)| flat(value, &format!("{place}/{at}"), into))
+            }
             leaf => drop(into.insert(place.to_owned(), leaf.to_string())),
         }
     }

@@ -66,14 +66,36 @@ pub(crate) fn text(base: &Path, settings: &Settings, traces: &TraceSet) -> Resul
         ("license", or(&about.license, "unknown")),
         ("url", or(&about.url, "https://huggingface.co/datasets")),
         ("creator", about.authors.iter().map(|name| json!({"@type": "sc:Person", "name": name})).collect()),
-        ("rai:dataLimitations", or(&about.limitations, "Scores hold for these models, prompts and scenes. `report/` names what the data cannot show.")),
+        (
+            "rai:dataLimitations",
+            or(
+                &about.limitations,
+                "Scores hold for these models, prompts and scenes. `report/` names what the data cannot show.",
+            ),
+        ),
         ("rai:dataBiases", or(&about.biases, "Not examined.")),
         ("rai:personalSensitiveInformation", or(&about.personal, if has_people { people } else { nobody })),
-        ("rai:dataUseCases", or(&about.uses, "Evaluation and comparison of agents. Not for training: a model trained on it can no longer be evaluated with it.")),
+        (
+            "rai:dataUseCases",
+            or(
+                &about.uses,
+                "Evaluation and comparison of agents. Not for training: a model trained on it can no longer be evaluated with it.",
+            ),
+        ),
         ("rai:dataSocialImpact", or(&about.impact, "Not examined.")),
         ("rai:hasSyntheticData", about.synthetic.unwrap_or(is_recorded).into()),
         ("prov:wasDerivedFrom", about.derived_from.iter().map(|from| json!({"@id": from})).collect()),
-        ("prov:wasGeneratedBy", or(&about.generated_by, concat!("mirrorstats ", env!("CARGO_PKG_VERSION"), ": `experiments/`, `world/` and `prompts/` have the settings."))),
+        (
+            "prov:wasGeneratedBy",
+            or(
+                &about.generated_by,
+                concat!(
+                    "mirrorstats ",
+                    env!("CARGO_PKG_VERSION"),
+                    ": `experiments/`, `world/` and `prompts/` have the settings."
+                ),
+            ),
+        ),
         ("distribution", sources(base)?.iter().map(file_object).collect()),
     ] {
         root.insert(key.to_owned(), value);

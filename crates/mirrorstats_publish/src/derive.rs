@@ -8,6 +8,7 @@ use std::path::Path;
 use mirrorstats_exact::hash;
 use mirrorstats_study::Study;
 use mirrorstats_study::losses::LostAs;
+use mirrorstats_study::pairs::pairs;
 use mirrorstats_study::question::Question;
 use mirrorstats_study::report::{ReportOptions, report};
 use mirrorstats_trace::inputs::Input;
@@ -16,7 +17,7 @@ use mirrorstats_view::export;
 use serde_json::Value;
 
 use crate::card::{self, Card};
-use crate::manifest::{Frames, Settings};
+use crate::manifest::{Frames, Settings, list};
 use crate::sources::{TRACES, definitions_text, prompt, write_prompt};
 use crate::{Progress, PublishError, croissant, frames, write};
 
@@ -71,6 +72,15 @@ pub(crate) fn derive(
         write(&out.join(name), text)?;
     }
     write_recordings(base, out, traces)?;
+    let mut notes = Vec::new();
+    if settings.frames != Frames::None {
+        progress("frames");
+        frames::write_frames(&study, base, out, settings.frames, &mut notes)?;
+    }
+    if settings.frames == Frames::Decisive {
+        // The viewer would show all frames of a log.
+        remove_logs(&out.join(TRACES))?;
+    }
     progress("report");
     let style = if settings.style.contains('/') { base.join(&settings.style) } else { settings.style.clone().into() };
     let report = report(&study, &ReportOptions { style: style.clone(), figures: true, png: false })?;
@@ -87,18 +97,26 @@ pub(crate) fn derive(
         threads,
     };
     export::write(&options, &out.join("viewer"), &|done, all| progress(&format!("viewer: {done} of {all} episodes")))?;
-    let mut notes = report.notes.clone();
-    if settings.frames != Frames::None {
-        progress("frames");
-        frames::write_frames(&study, base, out, settings.frames, &mut notes)?;
-    }
+    notes.extend(report.notes.clone());
     let episodes = report.results.episodes.len();
+    let pairs = pairs(&study)?.map(|pairs| pairs.to_string());
+    notes.extend(pairs.clone());
     let table = report.main_table().map(|table| table.printed().markdown()).unwrap_or_default();
-    let card = Card { settings, base, out, episodes, table: &table, traces };
+    let card = Card { settings, base, out, episodes, table: &table, pairs: pairs.as_deref(), traces };
     write(&out.join("README.md"), card.readme()?)?;
     write(&out.join("CITATION.cff"), card::citation(&settings.about))?;
     write(&out.join(croissant::NAME), croissant::text(base, settings, traces)?)?;
     Ok(Derived { episodes, notes })
+}
+
+fn remove_logs(folder: &Path) -> Result<(), PublishError> {
+    for name in if folder.is_dir() { list(folder)? } else { Vec::new() } {
+        if name.ends_with(".mcap") {
+            let log = folder.join(name);
+            fs::remove_file(&log).map_err(PublishError::file(&log))?;
+        }
+    }
+    Ok(())
 }
 
 /// Writes experiments, worlds and prompts as the footers of the traces declare them.

@@ -53,7 +53,7 @@ pub(crate) fn write_frames(
     notes: &mut Vec<String>,
 ) -> Result<(), PublishError> {
     let folder = out.join(FRAMES);
-    let mut without = 0;
+    let mut without: u64 = 0;
     for input in inputs(base)? {
         let name = input.path.file_name().unwrap_or_default().to_owned();
         let log = input.path.with_extension("mcap");
@@ -188,12 +188,7 @@ fn short(digest: &str) -> &str {
     digest.split('-').next().unwrap_or(digest)
 }
 
-fn write_table(
-    path: &Path,
-    source: &str,
-    episodes: &[Episode],
-    mut pictures: Pictures,
-) -> Result<(), PublishError> {
+fn write_table(path: &Path, source: &str, episodes: &[Episode], mut pictures: Pictures) -> Result<(), PublishError> {
     let schema = schema();
     let failed = |error: parquet::errors::ParquetError| PublishError::Refused(format!("{}: {error}", path.display()));
     let properties = WriterProperties::builder()

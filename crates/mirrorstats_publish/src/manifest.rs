@@ -86,8 +86,15 @@ impl Manifest {
         let outputs = list(base)?.into_iter().map(|path| output_of(base, path)).collect::<Result<_, _>>()?;
         let version = env!("CARGO_PKG_VERSION").to_owned();
         let format = FORMAT.to_owned();
-        let manifest =
-            Self { format, version, schema_version: SCHEMA_VERSION, episodes, settings, outputs, sha256: String::new() };
+        let manifest = Self {
+            format,
+            version,
+            schema_version: SCHEMA_VERSION,
+            episodes,
+            settings,
+            outputs,
+            sha256: String::new(),
+        };
         Ok(Self { sha256: manifest.own_hash(), ..manifest })
     }
 

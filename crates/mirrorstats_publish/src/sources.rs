@@ -19,7 +19,7 @@ use mirrorstats_study::Study;
 use mirrorstats_study::question::Question;
 use mirrorstats_trace::beside::labels::{self, list_beside};
 use mirrorstats_trace::beside::lost::list_of;
-use mirrorstats_trace::read::episode_rows;
+use mirrorstats_trace::read::episode_rows::{self, Displayed, EpisodeRows};
 use mirrorstats_trace::read::open::{TraceFile, TraceSet};
 use mirrorstats_trace::write::merge;
 use serde::Deserialize;
@@ -30,11 +30,12 @@ use crate::{PublishError, write};
 
 pub(crate) const TRACES: &str = "traces";
 const PROMPTS: &str = "prompts";
+const PARTICIPANT: &str = "participant";
 /// The journal of a recording with people, which is never published.
 const JOURNAL: &str = "participants.jsonl";
 const LONGEST_LINE: Limit = Limit::new("bytes in a line of the journal of participants", 4 << 20);
 
-/// Copies traces, their lists and, with all frames, their logs. Returns what was withheld.
+/// Copies traces, their lists and, for frames, their logs. Returns what was withheld.
 pub(crate) fn copy_traces(
     traces: &TraceSet,
     frames: Frames,
@@ -49,13 +50,14 @@ pub(crate) fn copy_traces(
         let out = withdrawn(folder_of(file.path()))?;
         let own = copy_trace(file, &to, &out, &mut withheld)?;
         let log = file.path().with_extension("mcap");
-        if log.is_file() && frames == Frames::All && to.is_file() {
+        if log.is_file() && frames != Frames::None && to.is_file() {
             let to = to.with_extension("mcap");
             copy(&log, &to)?;
             if !own.is_empty() {
                 assemble::without(&to, &own, &file.recording())?;
             }
-        } else if log.is_file() {
+        }
+        if log.is_file() && frames != Frames::All {
             withheld.insert(Withheld {
                 kind: "log".to_owned(),
                 sha256: input::open(&log).and_then(hash::of_reader).map_err(PublishError::file(&log))?,
@@ -94,14 +96,13 @@ fn copy_trace(
     people: &BTreeSet<String>,
     withheld: &mut BTreeSet<Withheld>,
 ) -> Result<BTreeSet<String>, PublishError> {
-    if people.is_empty() || !file.declares("participant") {
+    if people.is_empty() || !file.declares(PARTICIPANT) {
         copy(file.path(), to)?;
         return Ok(BTreeSet::new());
     }
     let (mut own, mut others) = (BTreeSet::new(), Vec::new());
     for rows in episode_rows::read(file.path())? {
-        let episode = rows.identity().map_err(|error| PublishError::Refused(format!("{}: {error}", file.name())))?;
-        if episode.participant.is_some_and(|code| people.contains(&code)) {
+        if participant(&rows).is_some_and(|code| people.contains(&code)) {
             let sha256 = rows.stated_hash().unwrap_or_else(|| hash::of_bytes(rows.episode_id.as_bytes()));
             let reason = "the person declined or withdrew".to_owned();
             withheld.insert(Withheld { kind: "episode".to_owned(), sha256, reason });
@@ -117,6 +118,16 @@ fn copy_trace(
         merge::write(to, Some(&recording).filter(|value| !value.is_null()), &others)?;
     }
     Ok(own)
+}
+
+/// The code of the person who played, in a trace of any domain.
+fn participant(rows: &EpisodeRows) -> Option<String> {
+    let columns = rows.own_columns();
+    let column = columns.iter().find(|column| column.name == PARTICIPANT)?;
+    column.values().flatten().find_map(|value| match value {
+        Displayed::Text(code) => Some(code),
+        Displayed::Bool(_) => None,
+    })
 }
 
 /// The codes of people whose data must not be published, from the journal beside the traces.

@@ -13,8 +13,8 @@ use mirrorstats_study::findings::findings;
 use mirrorstats_study::verify::{Difference, Kind, Verification, verify as verify_hashes};
 use mirrorstats_trace::diagnostic::Severity;
 
-pub use crate::manifest::is_bundle;
 use crate::compare::compare;
+pub use crate::manifest::is_bundle;
 use crate::manifest::{Manifest, list, read_text};
 use crate::{Progress, PublishError, croissant, derive};
 
@@ -51,7 +51,17 @@ fn changed(path: &str, cell: Option<String>, expected: &str, found: &str) -> Dif
 fn add_second_record(folder: &Path, found: &mut Verification) -> Result<(), PublishError> {
     let text = std::fs::read(folder.join(croissant::NAME)).unwrap_or_default();
     let stated: std::collections::BTreeMap<_, _> = croissant::stated(&text).into_iter().collect();
-    for source in croissant::sources(folder)? {
+    let sources = croissant::sources(folder)?;
+    for path in stated.keys().filter(|path| sources.iter().all(|source| source.path != **path)) {
+        if found.differences.iter().all(|difference| difference.path != *path) {
+            let expected = format!("the source that {} states", croissant::NAME);
+            let found_here = "no such file".to_owned();
+            let difference =
+                Difference { path: path.clone(), kind: Kind::Missing, cell: None, expected, found: found_here };
+            found.differences.push(difference);
+        }
+    }
+    for source in sources {
         let known = found.differences.iter().any(|difference| difference.path == source.path);
         let stated = stated.get(&source.path).map_or("no such file", String::as_str);
         if !known && stated != source.sha256 {

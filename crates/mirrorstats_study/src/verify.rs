@@ -142,8 +142,9 @@ fn difference(
     there: Option<Metadata>,
 ) -> Result<Option<Difference>, ProvenanceError> {
     let expected = format!("{} bytes with the SHA-256 {}", output.bytes, output.sha256);
-    let differs =
-        |kind, found: String| Ok(Some(Difference { path: path.to_owned(), kind, cell: None, expected: expected.clone(), found }));
+    let differs = |kind, found: String| {
+        Ok(Some(Difference { path: path.to_owned(), kind, cell: None, expected: expected.clone(), found }))
+    };
     let Some(about) = there else { return differs(Kind::Missing, "no such file".to_owned()) };
     if !about.is_file() {
         return differs(Kind::Changed, kind_of(&about).to_owned());

@@ -16,9 +16,9 @@ use serde_json::{Value, json};
 use super::answers::{changes, episode, list, map, overview};
 use super::found::Found;
 use super::logs::Opened;
+use super::picture::smaller;
 use super::snapshot::Together;
 use super::{Options, Snapshot, View, ViewError, page};
-use super::picture::smaller;
 use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
 use mirrorstats_exact::hash;
 use mirrorstats_exact::replace::{

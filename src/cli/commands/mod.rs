@@ -14,9 +14,9 @@ pub(super) mod trace;
 #[cfg(feature = "sim")]
 pub(super) mod world;
 
+use study::{diff, figure, gate, plan, query, report, score, stats, verify};
 #[cfg(feature = "view")]
 use study::{publish, view};
-use study::{diff, figure, gate, plan, query, report, score, stats, verify};
 
 use super::outcome::{Failure, Outcome};
 

@@ -19,7 +19,8 @@ fn step(folder: &Path, command: &str, arguments: &str, accept: &str) -> (Answer,
         let _ = fs::remove_file(of(name));
     }
     let answer = answer(&mut script);
-    let texts = ["outputs", "mirrorstats-comment.md", "summary.md"].map(|name| fs::read_to_string(of(name)).unwrap_or_default());
+    let texts = ["outputs", "mirrorstats-comment.md", "summary.md"]
+        .map(|name| fs::read_to_string(of(name)).unwrap_or_default());
     (answer, texts)
 }
 
@@ -38,7 +39,10 @@ fn a_gate_names_flipped_episodes_and_their_deciding_steps() {
     answer.ends(0);
     let (answer, [outputs, ..]) = step(at, "gate", &format!("{both}--metric\nNONE"), "0");
     let told = answer.ends(2).stdout;
-    assert!(outputs.starts_with("verdict=error\nexit-code=2\n") && told.starts_with("::error title=mirrorstats gate::"), "{told}");
+    assert!(
+        outputs.starts_with("verdict=error\nexit-code=2\n") && told.starts_with("::error title=mirrorstats gate::"),
+        "{told}"
+    );
     let (answer, [outputs, ..]) = step(at, "score", "a", "0");
     assert!(answer.ends(2).stderr.contains("expected the command gate or verify") && outputs.is_empty());
 }

@@ -26,7 +26,8 @@ pub fn published(frames: &str) -> TempDir {
     fs::write(at.join("mine.toml"), "include = [\"paper\"]\n[metric.STEPS]\ntitle = \"Steps\"\nvalue = \"length()\"\n")
         .unwrap();
     fs::write(at.join("about.toml"), ABOUT).unwrap();
-    let words = ["publish", "runs", "-o", "out", "--definitions", "mine.toml", "--about", "about.toml", "--frames", frames];
+    let words =
+        ["publish", "runs", "-o", "out", "--definitions", "mine.toml", "--about", "about.toml", "--frames", frames];
     run(at, &words).done();
     folder
 }
@@ -46,7 +47,10 @@ pub fn named(folder: &Path) -> (i32, Vec<String>) {
 pub fn rewrite_manifest(bundle: &Path) {
     let path = bundle.join("manifest.json");
     let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-    manifest["outputs"].as_array_mut().unwrap().retain(|output| bundle.join(output["path"].as_str().unwrap()).is_file());
+    manifest["outputs"]
+        .as_array_mut()
+        .unwrap()
+        .retain(|output| bundle.join(output["path"].as_str().unwrap()).is_file());
     for output in manifest["outputs"].as_array_mut().unwrap() {
         let bytes = fs::read(bundle.join(output["path"].as_str().unwrap())).unwrap();
         output["bytes"] = bytes.len().into();

@@ -27,6 +27,7 @@ pub(super) fn write_all(study: &Study, about: &About, out: &Path) -> Result<Vec<
     let models = results(study)?;
     let episodes = study.score()?.episodes;
     let transcripts = transcripts(study, &episodes)?;
+    let unknown = models.keys().find(|model| !model.contains('/')).cloned();
     for (model, results) in models {
         let (developer, own) = model.split_once('/').unwrap_or(("unknown", &model));
         let id = format!("{developer}/{own}");
@@ -58,7 +59,11 @@ pub(super) fn write_all(study: &Study, about: &About, out: &Path) -> Result<Vec<
         let text = serde_json::to_string_pretty(&root).expect("a tree of JSON values") + "\n";
         write(&out.join(format!("{path}.json")), text)?;
     }
-    Ok(LEFT_OUT.map(str::to_owned).to_vec())
+    let mut left_out = LEFT_OUT.map(str::to_owned).to_vec();
+    if let Some(model) = unknown {
+        left_out.push(format!("a model without its developer: name `{model}` as DEVELOPER/MODEL"));
+    }
+    Ok(left_out)
 }
 
 /// The results of each model.
@@ -66,7 +71,8 @@ fn results(study: &Study) -> Result<BTreeMap<String, Vec<Value>>, PublishError> 
     let cells = study.cells()?;
     if cells.by != ["experiment", "model"] {
         let found = cells.by.join(",");
-        let help = "help: a line of the format belongs to one experiment; leave --by out, or keep one condition with --where";
+        let help =
+            "help: a line of the format belongs to one experiment; leave --by out, or keep one condition with --where";
         let message = format!("expected episodes grouped by experiment,model, found {found}\n  {help}");
         return Err(PublishError::Refused(message));
     }
@@ -127,7 +133,8 @@ fn lines(
         let answers = said.iter().zip(1..).map(|(text, at)| turn(at, "assistant", text));
         let messages: Vec<Value> = std::iter::once(turn(0, "user", &ask)).chain(answers).collect();
         for column in &episodes.metrics {
-            let Some(value) = column.get(row).filter(|_| episodes.catalog.metric[&column.name].kind == Kind::Rate) else {
+            let Some(value) = column.get(row).filter(|_| episodes.catalog.metric[&column.name].kind == Kind::Rate)
+            else {
                 continue;
             };
             let name = format!("{}: {}", key.experiment, column.name);

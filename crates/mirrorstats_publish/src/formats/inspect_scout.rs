@@ -50,7 +50,12 @@ pub(super) fn write_all(study: &Study, out: &Path) -> Result<Vec<String>, Publis
         ("transcript_id", text(&|row| Some(rows[row].0.episode_id.clone()))),
         ("source_type", text(&|_| Some("mirrorstats".to_owned()))),
         ("task_set", text(&|row| Some(rows[row].0.experiment.clone()))),
-        ("task_id", text(&|row| head(row).scene.clone().or_else(|| Some(format!("s{}/r{}", rows[row].0.seed, rows[row].0.run))))),
+        (
+            "task_id",
+            text(&|row| {
+                head(row).scene.clone().or_else(|| Some(format!("s{}/r{}", rows[row].0.seed, rows[row].0.run)))
+            }),
+        ),
         ("task_repeat", number(&|row| head(row).repetition.unwrap_or(1).into())),
         ("model", text(&|row| Some(rows[row].0.model.clone()))),
         ("score", text(&|row| Some(rows[row].1.clone()))),
@@ -63,7 +68,8 @@ pub(super) fn write_all(study: &Study, out: &Path) -> Result<Vec<String>, Publis
     ];
     let path = out.join(FILE);
     let failed = |error: String| PublishError::Refused(format!("{FILE}: {error}"));
-    let batch = RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(name, values)| (name, values, true)));
+    let batch =
+        RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(name, values)| (name, values, true)));
     let batch = batch.map_err(|error| failed(error.to_string()))?;
     let file = File::create(&path).map_err(PublishError::file(&path))?;
     let written = ArrowWriter::try_new(file, batch.schema(), None).and_then(|mut writer| {
@@ -77,7 +83,8 @@ pub(super) fn write_all(study: &Study, out: &Path) -> Result<Vec<String>, Publis
 /// The messages of a transcript: what was asked, then what the agent said or did in each step.
 fn messages(experiment: &str, transcript: &Transcript) -> String {
     let ask = format!("{experiment}: the observation of each step, until the agent decides");
-    let message = |at: usize, role: &str, content: &str| json!({ "id": at.to_string(), "role": role, "content": content });
+    let message =
+        |at: usize, role: &str, content: &str| json!({ "id": at.to_string(), "role": role, "content": content });
     let answers = transcript.said.iter().zip(1..).map(|(text, at)| message(at, "assistant", text));
     Value::from(std::iter::once(message(0, "user", &ask)).chain(answers).collect::<Vec<_>>()).to_string()
 }

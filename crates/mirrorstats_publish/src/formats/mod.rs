@@ -41,7 +41,9 @@ pub fn export(
 ) -> Result<(Vec<String>, Vec<String>), PublishError> {
     if fs::read_dir(out).map_or(out.exists(), |mut entries| entries.next().is_some()) {
         let name = out.display();
-        return Err(PublishError::Refused(format!("--out: expected a new folder, found `{name}`\n  help: name another folder")));
+        return Err(PublishError::Refused(format!(
+            "--out: expected a new folder, found `{name}`\n  help: name another folder"
+        )));
     }
     let parent = folder_of(out);
     make_folder(parent).map_err(PublishError::file(parent))?;

@@ -142,7 +142,9 @@ impl PublishArgs {
         }
         output::notes(&answer.notes);
         if !has_license {
-            output::note("the bundle has no licence: name one in the file of --about, such as `license = \"CC-BY-4.0\"`");
+            output::note(
+                "the bundle has no licence: name one in the file of --about, such as `license = \"CC-BY-4.0\"`",
+            );
         }
         let (files, episodes) = (counted(answer.files as u64, "file"), counted(answer.episodes as u64, "episode"));
         output::say(&format!("{files}, {episodes}; the bundle is in {}", answer.out));

@@ -43,7 +43,9 @@ impl VerifyArgs {
     fn verify(&self) -> Result<Verification, Failure> {
         let mut found = verify(&self.folder)?;
         if self.folder.join("croissant.json").is_file() {
-            found.notes.push("nothing was computed again: this program was built without the feature `view`".to_owned());
+            found
+                .notes
+                .push("nothing was computed again: this program was built without the feature `view`".to_owned());
         }
         Ok(found)
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use arrow::datatypes::DataType;
 use mirrorstats_exact::format::counted;
-use mirrorstats_trace::read::open::TraceSet;
+use mirrorstats_trace::read::open::{TraceFile, TraceSet};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::{Value, json};
 
@@ -32,7 +32,7 @@ impl Card<'_> {
     /// `README.md`: metadata as YAML for the Hub, then text for people.
     pub fn readme(&self) -> Result<String, PublishError> {
         let about = &self.settings.about;
-        let (rows, has_frames) = (self.traces.files().iter().map(|file| file.rows()).sum::<u64>(), self.has_frames());
+        let (rows, has_frames) = (self.traces.files().iter().map(TraceFile::rows).sum::<u64>(), self.has_frames());
         let license = about.license.as_deref().unwrap_or("unknown").to_ascii_lowercase();
         let tags = ["mirrorstats", "evaluation", "embodied-ai", "agents"].map(str::to_owned);
         let tags: Vec<String> = tags.into_iter().chain(about.tags.iter().cloned()).collect();
@@ -49,7 +49,7 @@ impl Card<'_> {
             "configs": configs, "dataset_info": infos,
         });
         // JSON is YAML: quoting is never in doubt.
-        let mut text = format!("---\n{}---\n\n# {}\n\n{}\n\n", yaml(&front), about.title(), about.description());
+        let mut text = format!("---\n{front:#}\n---\n\n# {}\n\n{}\n\n", about.title(), about.description());
         let episodes = counted(self.episodes as u64, "episode");
         let _ = writeln!(text, "{episodes}, {}.\n\n## Results\n\n{}\n", counted(rows, "step"), self.table.trim_end());
         if let Some(pairs) = self.pairs {
@@ -91,32 +91,8 @@ impl Card<'_> {
     }
 }
 
-const LAYOUT: &str = "\
-## Files
-
-| path | contents |
-|---|---|
-| `traces/` | one row per step, as recorded; logs with frames beside them, if they are published |
-| `frames/` | the frames of steps as images, if they are published |
-| `scores.parquet` | one row per episode, with every metric |
-| `definitions/` | the definitions of the metrics |
-| `experiments/`, `world/`, `prompts/` | what the agents were shown and asked, as the traces declare it |
-| `report/` | tables and figures; open `report/report.html` |
-| `viewer/` | each episode step by step; open `viewer/index.html` |
-| `croissant.json`, `CITATION.cff` | metadata for registries |
-| `manifest.json` | the settings, and the SHA-256 of every file |
-";
-
-const CHECK: &str = "\
-```
-
-## Check
-
-```sh
-pip install mirrorstats
-mirrorstats verify .     # hashes; then every score, cell, table and figure again from the traces
-```
-";
+const LAYOUT: &str = include_str!("../../../assets/publish/files.md");
+const CHECK: &str = include_str!("../../../assets/publish/check.md");
 
 fn size(rows: u64) -> &'static str {
     match rows {
@@ -140,56 +116,22 @@ fn features(config: &str, files: &[std::path::PathBuf]) -> Result<Value, Publish
             if features.iter().any(|known| known["name"] == *field.name()) {
                 continue;
             }
-            let dtype = if config == FRAMES && field.name() == "image" { "image" } else { dtype(field.data_type()) };
+            let dtype =
+                if config == FRAMES && field.name() == "image" { "image".to_owned() } else { dtype(field.data_type()) };
             features.push(json!({"name": field.name(), "dtype": dtype}));
         }
     }
     Ok(features.into())
 }
 
-fn dtype(kind: &DataType) -> &'static str {
+/// The type of a column as `datasets` names it.
+pub(crate) fn dtype(kind: &DataType) -> String {
     match kind {
-        DataType::Boolean => "bool",
-        DataType::Int8 => "int8",
-        DataType::Int16 => "int16",
-        DataType::Int32 => "int32",
-        DataType::Int64 => "int64",
-        DataType::UInt8 => "uint8",
-        DataType::UInt16 => "uint16",
-        DataType::UInt32 => "uint32",
-        DataType::UInt64 => "uint64",
-        DataType::Float32 => "float32",
-        DataType::Float64 => "float64",
-        DataType::LargeUtf8 => "large_string",
-        DataType::Null => "null",
-        _ => "string",
+        DataType::Boolean => "bool".to_owned(),
+        DataType::LargeUtf8 => "large_string".to_owned(),
+        number if number.is_numeric() => number.to_string().to_lowercase(),
+        _ => "string".to_owned(),
     }
-}
-
-/// Block style for the outer levels, which registries show; JSON for the rest.
-fn yaml(front: &Value) -> String {
-    let mut text = String::new();
-    for (key, value) in front.as_object().into_iter().flatten() {
-        match value.as_array().filter(|items| items.iter().all(Value::is_object)) {
-            None => {
-                let _ = writeln!(text, "{key}: {value}");
-            }
-            Some(items) => {
-                let _ = writeln!(text, "{key}:");
-                for item in items {
-                    let lines = item.as_object().into_iter().flatten().map(|(key, value)| match value.as_array() {
-                        None => format!("{key}: {value}"),
-                        Some(parts) => {
-                            let parts = parts.iter().map(|part| format!("\n    - {part}"));
-                            format!("{key}:{}", parts.collect::<String>())
-                        }
-                    });
-                    let _ = writeln!(text, "  - {}", lines.collect::<Vec<_>>().join("\n    "));
-                }
-            }
-        }
-    }
-    text
 }
 
 /// `CITATION.cff`.

@@ -46,7 +46,7 @@ pub(crate) fn compare(published: &Path, again: &Path, path: &str) -> Result<Vec<
     let rest = cells.len().saturating_sub(LISTED);
     let mut differences: Vec<Difference> = cells.into_iter().take(LISTED).map(|cell| changed(path, cell)).collect();
     if let Some(last) = differences.last_mut().filter(|_| rest > 0) {
-        last.found += &format!(" (and {})", counted(rest as u64, "more difference"));
+        last.found = format!("{} (and {})", last.found, counted(rest as u64, "more difference"));
     }
     Ok(differences)
 }
@@ -95,7 +95,7 @@ fn json(old: &[u8], new: &[u8]) -> Vec<Cell> {
         match value {
             Value::Object(map) => map.iter().for_each(|(key, value)| flat(value, &format!("{place}/{key}"), into)),
             Value::Array(list) => {
-                list.iter().zip(0..).for_each(|(value, at)| flat(value, &format!("{place}/{at}"), into))
+                list.iter().zip(0..).for_each(|(value, at)| flat(value, &format!("{place}/{at}"), into));
             }
             leaf => drop(into.insert(place.to_owned(), leaf.to_string())),
         }

@@ -111,7 +111,7 @@ pub(crate) fn derive(
 
 fn remove_logs(folder: &Path) -> Result<(), PublishError> {
     for name in if folder.is_dir() { list(folder)? } else { Vec::new() } {
-        if name.ends_with(".mcap") {
+        if Path::new(&name).extension().is_some_and(|ending| ending == "mcap") {
             let log = folder.join(name);
             fs::remove_file(&log).map_err(PublishError::file(&log))?;
         }

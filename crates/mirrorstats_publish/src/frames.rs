@@ -20,18 +20,20 @@ use mirrorstats_log::frames::LogIndex;
 use mirrorstats_study::Study;
 use mirrorstats_study::explain::explain_each_in;
 use mirrorstats_trace::catch_panic::contained;
-use mirrorstats_trace::episodes::episode::Episode;
+use mirrorstats_trace::episodes::episode::{Action, Episode};
 use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::read::episode_rows;
 use mirrorstats_view::picture;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
+use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::json;
 
 use crate::PublishError;
+use crate::card::dtype;
 use crate::derive::inputs;
 use crate::manifest::Frames;
 
@@ -43,6 +45,12 @@ const LARGEST_IMAGE: usize = 1_000_000;
 
 /// Pictures by episode and step.
 type Pictures = BTreeMap<(String, i32), Vec<u8>>;
+
+/// The frames of a trace.
+enum Source {
+    Log(LogIndex),
+    Table(Pictures),
+}
 
 /// Writes the frames of each trace whose log is beside it, or whose frames are in the bundle already.
 pub(crate) fn write_frames(
@@ -58,27 +66,26 @@ pub(crate) fn write_frames(
         let name = input.path.file_name().unwrap_or_default().to_owned();
         let log = input.path.with_extension("mcap");
         let table = base.join(FRAMES).join(&name);
-        let episodes = if log.is_file() || table.is_file() { read_episodes(&input)? } else { Vec::new() };
-        let wanted = match frames {
-            Frames::Decisive => Some(decisive(study, &input, &episodes)?),
-            Frames::All | Frames::None => None,
-        };
-        let mut pictures = Pictures::new();
-        let source = if log.is_file() {
-            of_log(&log, &episodes, wanted.as_ref(), &mut pictures)?;
-            input.name.replace(".parquet", ".mcap")
+        let (source, source_name) = if log.is_file() {
+            (Source::of_log(&log)?, input.name.replace(".parquet", ".mcap"))
+        } else if table.is_file() && base != out {
+            (Some(Source::Table(of_table(&table, &input.name)?)), format!("{FRAMES}/{}", name.to_string_lossy()))
         } else {
-            if table.is_file() && base != out {
-                of_table(&table, &input.name, &mut pictures)?;
-            }
-            format!("{FRAMES}/{}", name.to_string_lossy())
+            (None, String::new())
         };
-        if pictures.is_empty() {
-            without += 1;
-            continue;
-        }
-        make_folder(&folder).map_err(PublishError::file(&folder))?;
-        write_table(&folder.join(&name), &source, &episodes, pictures)?;
+        let is_written = match source {
+            None => false,
+            Some(source) => {
+                let episodes = read_episodes(&input)?;
+                let wanted = match frames {
+                    Frames::Decisive => Some(decisive(study, &input, &episodes)?),
+                    Frames::All | Frames::None => None,
+                };
+                make_folder(&folder).map_err(PublishError::file(&folder))?;
+                write_table(&folder.join(&name), (source, &source_name), &episodes, wanted.as_ref())?
+            }
+        };
+        without += u64::from(!is_written);
     }
     if without > 0 {
         notes.push(format!("no frames of {}: no log with them is beside", counted(without, "trace")));
@@ -103,34 +110,48 @@ fn decisive(study: &Study, input: &Input, episodes: &[Episode]) -> Result<BTreeS
     Ok(steps)
 }
 
-fn of_log(
-    log: &Path,
-    episodes: &[Episode],
-    wanted: Option<&BTreeSet<(String, i32)>>,
-    pictures: &mut Pictures,
-) -> Result<(), PublishError> {
-    let index = match LogIndex::open(log) {
-        Ok(Some(index)) => index,
-        Ok(None) | Err(LogError::Foreign { .. }) => return Ok(()),
-        Err(error) => return Err(error.into()),
-    };
-    for episode in episodes {
-        let times: BTreeMap<u64, i32> = (1..)
-            .zip(&episode.steps)
-            .filter_map(|(t, step)| Some((u64::try_from(step.extra.frame_time?).ok()?, t)))
-            .filter(|(_, t)| wanted.is_none_or(|wanted| wanted.contains(&(episode.episode_id.clone(), *t))))
-            .collect();
-        index.each_moment(&episode.episode_id, &times.keys().copied().collect(), &mut |time, moment| {
-            if let Some(frame) = moment.frame {
-                pictures.insert((episode.episode_id.clone(), times[&time]), frame);
-            }
-        })?;
+impl Source {
+    /// `None` for a log without an index, or of another program.
+    fn of_log(log: &Path) -> Result<Option<Self>, PublishError> {
+        match LogIndex::open(log) {
+            Ok(index) => Ok(index.map(Self::Log)),
+            Err(LogError::Foreign { .. }) => Ok(None),
+            Err(error) => Err(error.into()),
+        }
     }
-    Ok(())
+
+    /// The pictures of an episode by step. One episode of a log is in memory at a time.
+    fn pictures(
+        &mut self,
+        episode: &Episode,
+        wanted: Option<&BTreeSet<(String, i32)>>,
+    ) -> Result<BTreeMap<i32, Vec<u8>>, PublishError> {
+        let key = |t: i32| (episode.episode_id.clone(), t);
+        let mut found = BTreeMap::new();
+        match self {
+            Self::Table(pictures) => {
+                let steps = (1..).zip(&episode.steps).map(|(t, _)| t);
+                found.extend(steps.filter_map(|t| Some((t, pictures.remove(&key(t))?))));
+            }
+            Self::Log(index) => {
+                let times: BTreeMap<u64, i32> = (1..)
+                    .zip(&episode.steps)
+                    .filter_map(|(t, step)| Some((u64::try_from(step.extra.frame_time?).ok()?, t)))
+                    .filter(|(_, t)| wanted.is_none_or(|wanted| wanted.contains(&key(*t))))
+                    .collect();
+                let moments = times.keys().copied().collect();
+                index.each_moment(&episode.episode_id, &moments, &mut |time, moment| {
+                    found.extend(moment.frame.map(|frame| (times[&time], frame)));
+                })?;
+            }
+        }
+        Ok(found)
+    }
 }
 
 /// Reads the pictures of a published table, which may be damaged.
-fn of_table(path: &Path, trace: &str, pictures: &mut Pictures) -> Result<(), PublishError> {
+fn of_table(path: &Path, trace: &str) -> Result<Pictures, PublishError> {
+    let mut pictures = Pictures::new();
     let damaged = |words: String| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         PublishError::Refused(format!("{FRAMES}/{name}: expected the frames of {trace}, found {words}"))
@@ -155,13 +176,12 @@ fn of_table(path: &Path, trace: &str, pictures: &mut Pictures) -> Result<(), Pub
             }
         }
     }
-    Ok(())
+    Ok(pictures)
 }
 
 /// The hash of each picture of a table by its episode and step; empty for a damaged table.
 pub(crate) fn hashes(path: &Path) -> BTreeMap<String, String> {
-    let mut pictures = Pictures::new();
-    let _ = of_table(path, "the trace", &mut pictures);
+    let pictures = of_table(path, "the trace").unwrap_or_default();
     let named = pictures.into_iter().map(|((id, t), bytes)| (format!("{id}, t = {t}"), hash::of_bytes(&bytes)));
     named.collect()
 }
@@ -188,9 +208,49 @@ fn short(digest: &str) -> &str {
     digest.split('-').next().unwrap_or(digest)
 }
 
-fn write_table(path: &Path, source: &str, episodes: &[Episode], mut pictures: Pictures) -> Result<(), PublishError> {
+/// Returns false if there is no frame, and so no file.
+fn write_table(
+    path: &Path,
+    (mut source, name): (Source, &str),
+    episodes: &[Episode],
+    wanted: Option<&BTreeSet<(String, i32)>>,
+) -> Result<bool, PublishError> {
     let schema = schema();
-    let failed = |error: parquet::errors::ParquetError| PublishError::Refused(format!("{}: {error}", path.display()));
+    let failed = |error: ParquetError| PublishError::Refused(format!("{}: {error}", path.display()));
+    let mut writer = None;
+    for episode in episodes {
+        let mut rows = Vec::new();
+        for (t, bytes) in source.pictures(episode, wanted)? {
+            let step = &episode.steps[usize::try_from(t - 1).unwrap_or_default()];
+            let place = format!("{name}, {}, t = {t}", episode.episode_id);
+            let bytes = checked(&bytes, &place, step.extra.frame_digest.as_deref())?;
+            rows.push((t, step.action.map(Action::name), bytes));
+        }
+        if rows.is_empty() {
+            continue;
+        }
+        let writer = match &mut writer {
+            Some(writer) => writer,
+            None => writer.insert(create(path, &schema)?.map_err(failed)?),
+        };
+        writer.write(&batch(&schema, episode, &rows).map_err(|error| failed(error.into()))?).map_err(failed)?;
+    }
+    if let Source::Table(rest) = source
+        && let Some((id, t)) = rest.keys().next()
+    {
+        let words = "expected frames of the steps of its trace, found one of";
+        return Err(PublishError::Refused(format!("{name}: {words} {id}, t = {t}")));
+    }
+    let is_written = writer.is_some();
+    if let Some(writer) = writer {
+        writer.close().map_err(failed)?;
+    }
+    Ok(is_written)
+}
+
+type Created = Result<ArrowWriter<File>, ParquetError>;
+
+fn create(path: &Path, schema: &Arc<Schema>) -> Result<Created, PublishError> {
     let properties = WriterProperties::builder()
         .set_created_by(concat!("mirrorstats version ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new("huggingface".to_owned(), features().to_string())]))
@@ -199,26 +259,7 @@ fn write_table(path: &Path, source: &str, episodes: &[Episode], mut pictures: Pi
         .build();
     let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
     let file = File::create(path).map_err(PublishError::file(path))?;
-    let mut writer = ArrowWriter::try_new_with_options(file, Arc::clone(&schema), options).map_err(failed)?;
-    for episode in episodes {
-        let mut rows = Vec::new();
-        for (t, step) in (1..).zip(&episode.steps) {
-            if let Some(bytes) = pictures.remove(&(episode.episode_id.clone(), t)) {
-                let place = format!("{source}, {}, t = {t}", episode.episode_id);
-                let bytes = checked(&bytes, &place, step.extra.frame_digest.as_deref())?;
-                rows.push((t, step.action.map(|action| action.name()), bytes));
-            }
-        }
-        writer.write(&batch(&schema, episode, &rows).map_err(|error| failed(error.into()))?).map_err(failed)?;
-    }
-    writer.close().map_err(failed)?;
-    match pictures.keys().next() {
-        Some((id, t)) => {
-            let words = "expected frames of the steps of its trace, found one of";
-            Err(PublishError::Refused(format!("{source}: {words} {id}, t = {t}")))
-        }
-        None => Ok(()),
-    }
+    Ok(ArrowWriter::try_new_with_options(file, Arc::clone(schema), options))
 }
 
 type Row = (i32, Option<&'static str>, Vec<u8>);
@@ -249,12 +290,9 @@ fn image_fields() -> Fields {
     vec![Field::new("bytes", DataType::Binary, true), Field::new("path", DataType::Utf8, true)].into()
 }
 
-const TEXTS: [&str; 3] = ["episode_id", "model", "experiment"];
-const NUMBERS: [&str; 3] = ["seed", "run", "t"];
-
 fn schema() -> Arc<Schema> {
-    let texts = TEXTS.map(|name| Field::new(name, DataType::Utf8, false));
-    let numbers = NUMBERS.map(|name| Field::new(name, DataType::Int32, false));
+    let texts = ["episode_id", "model", "experiment"].map(|name| Field::new(name, DataType::Utf8, false));
+    let numbers = ["seed", "run", "t"].map(|name| Field::new(name, DataType::Int32, false));
     let action = Field::new("action", DataType::Utf8, true);
     let image = Field::new("image", DataType::Struct(image_fields()), true);
     Arc::new(Schema::new(texts.into_iter().chain(numbers).chain([action, image]).collect::<Vec<_>>()))
@@ -262,10 +300,11 @@ fn schema() -> Arc<Schema> {
 
 /// The features of the table, as `datasets` and the Hub read them from a footer.
 fn features() -> serde_json::Value {
-    let value = |dtype: &str| json!({"dtype": dtype, "_type": "Value"});
-    let texts = TEXTS.iter().map(|name| ((*name).to_owned(), value("string")));
-    let numbers = NUMBERS.iter().map(|name| ((*name).to_owned(), value("int32")));
-    let rest = [("action".to_owned(), value("string")), ("image".to_owned(), json!({"_type": "Image"}))];
-    let features: serde_json::Map<_, _> = texts.chain(numbers).chain(rest).collect();
-    json!({"info": {"features": features}})
+    let feature = |field: &Arc<Field>| match field.data_type() {
+        DataType::Struct(_) => json!({"_type": "Image"}),
+        kind => json!({"dtype": dtype(kind), "_type": "Value"}),
+    };
+    let schema = schema();
+    let features = schema.fields().iter().map(|field| (field.name().clone(), feature(field)));
+    json!({"info": {"features": features.collect::<serde_json::Map<_, _>>()}})
 }

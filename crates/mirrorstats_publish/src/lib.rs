@@ -47,8 +47,8 @@ pub use manifest::{Frames, Manifest, Withheld};
 
 #[derive(Debug, thiserror::Error)]
 pub enum PublishError {
-    #[error("{0}")]
-    Study(Box<StudyError>),
+    #[error(transparent)]
+    Study(#[from] StudyError),
     #[error("{0}")]
     View(Box<ViewError>),
     #[error(transparent)]
@@ -67,12 +67,6 @@ pub enum PublishError {
     File { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Refused(String),
-}
-
-impl From<StudyError> for PublishError {
-    fn from(error: StudyError) -> Self {
-        Self::Study(Box::new(error))
-    }
 }
 
 impl From<ViewError> for PublishError {
@@ -146,12 +140,17 @@ pub fn publish(study: &Study, request: &PublishRequest, progress: Progress<'_>) 
     progress("hashes");
     let manifest = Manifest::of_folder(&base, settings, derived.episodes)?;
     write(&base.join(MANIFEST), manifest.json())?;
-    let mut paths: Vec<PathBuf> = manifest.outputs.iter().map(|output| PathBuf::from(&output.path)).collect();
-    paths.push(MANIFEST.into());
-    let staged: Vec<PathBuf> = paths.iter().map(|path| base.join(path)).collect();
-    let new: Vec<_> = paths.iter().map(PathBuf::as_path).zip(staged.iter().map(|path| Content::File(path))).collect();
-    replace_folder(out, &FolderFiles { new: &new, index: Some(Path::new(MANIFEST)), old: &old_files })?;
+    let mut files: Vec<String> = manifest.outputs.iter().map(|output| output.path.clone()).collect();
+    files.push(MANIFEST.to_owned());
+    put(&base, out, &files, Some(MANIFEST))?;
     Ok(Published { manifest, notes })
+}
+
+/// Replaces a folder by these files of a stage.
+pub(crate) fn put(stage: &Path, out: &Path, files: &[String], index: Option<&str>) -> Result<(), PublishError> {
+    let staged: Vec<PathBuf> = files.iter().map(|path| stage.join(path)).collect();
+    let new: Vec<_> = files.iter().map(Path::new).zip(staged.iter().map(|path| Content::File(path))).collect();
+    Ok(replace_folder(out, &FolderFiles { new: &new, index: index.map(Path::new), old: &old_files })?)
 }
 
 /// Accepts a new folder, an empty one, or an earlier bundle.

@@ -4,8 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::{hash, input};
+use mirrorstats_metric::file;
 use mirrorstats_report::bundle::{MANIFEST, Output};
+use mirrorstats_report::style;
+use mirrorstats_study::provenance::is_plain;
 use mirrorstats_trace::schema::SCHEMA_VERSION;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -136,6 +140,19 @@ pub(crate) fn read_text(folder: &Path) -> Result<(Manifest, Vec<u8>), PublishErr
         return Err(PublishError::Refused(format!(
             "{path}: expected `{FORMAT}` over trace schema {SCHEMA_VERSION}, found `{found}` over {}",
             manifest.schema_version
+        )));
+    }
+    let settings = &manifest.settings;
+    let named = [settings.definitions.as_deref(), Some(settings.style.as_str())];
+    let is_inside = |name: &str| {
+        let is_built_in = file::built_in(name).is_some() || style::built_in(name).is_some();
+        is_built_in || (name.contains('/') && is_plain(name))
+    };
+    // Rule of `verify`: no name leads out of the folder.
+    if let Some(name) = named.into_iter().flatten().find(|name| !is_inside(name)) {
+        let (path, name) = (path.display(), visible(name));
+        return Err(PublishError::Refused(format!(
+            "{path}: expected a built-in name or a file of the bundle, found `{name}`"
         )));
     }
     Ok((manifest, text))

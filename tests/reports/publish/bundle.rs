@@ -7,7 +7,7 @@ use mirrorstats_trace::episodes::episode::{Action, Step};
 use mirrorstats_trace::write::OptionalColumns;
 use serde_json::{Value, json};
 
-use crate::harness::files::{assert_same, contents, fixture};
+use crate::harness::files::{assert_same, contents, fixture, repository};
 use crate::harness::program::run;
 use crate::harness::traces::{episode, write_trace};
 use crate::publish::{named, published};
@@ -55,7 +55,7 @@ fn frames_are_left_out_or_those_that_decided() {
         (contents(&folder.path().join("out")), folder)
     };
     let (none, folder) = files("none");
-    assert!(!none.keys().any(|name| name.ends_with(".mcap") || name.starts_with("frames/")));
+    assert!(!none.keys().any(|name| name.contains(".mcap") || name.starts_with("frames/")));
     let manifest: Value = serde_json::from_slice(&none["manifest.json"]).unwrap();
     let withheld = &manifest["settings"]["withheld"][0];
     let log = fs::read(folder.path().join("runs/E1-guesser.mcap")).unwrap();
@@ -124,4 +124,38 @@ fn a_bundle_replaces_a_bundle_and_nothing_else() {
     assert!(!Path::new(&at.join("new")).exists());
     let told = run(at, &["verify", fixture("recorded").to_str().unwrap()]).refused();
     assert!(told.contains("manifest.json"), "{told}");
+}
+
+/// Equal names of scenes are a claim, in logs of others; recordings prove it.
+#[test]
+fn pairs_are_proven_or_claimed() {
+    let folder = published("none");
+    let at = folder.path();
+    let readme = |out: &str| fs::read_to_string(at.join(out).join("README.md")).unwrap();
+    let recorded = fixture("recorded").display().to_string();
+    run(at, &["publish", &recorded, "-o", "recorded", "--frames", "none"]).done();
+    let expected = "Comparisons by scene: pairs proven in 10 of 10 scenes: their first observations are alike.";
+    assert!(readme("recorded").contains(expected), "{}", readme("recorded"));
+    assert!(!run(at, &["stats", &recorded]).stderr.contains("pairs claimed"));
+    let steps: Vec<String> = ["act", "diffusion"]
+        .iter()
+        .flat_map(|model| (1..=3).map(move |run| (model, run)))
+        .map(|(model, run)| {
+            json!({
+                "episode_id": format!("{model}-{run}"), "t": 1, "model": model, "experiment": "pusht", "seed": 1,
+                "run": run, "scene": format!("s{run}"), "task": "push", "reward": 0.5, "action": 7,
+                "action_change": 0.25, "success": run > 1,
+            })
+        })
+        .map(|step| format!("{step}\n"))
+        .collect();
+    fs::write(at.join("steps.jsonl"), steps.concat()).unwrap();
+    let definitions = repository().join("examples/domains/robots.toml").display().to_string();
+    run(at, &["import", "steps.jsonl", "-o", "robots.parquet", "--definitions", &definitions]).done();
+    let note =
+        "note: pairs claimed, not proven: 1 of 1 file with scenes have no digest of the first observation or state";
+    assert!(run(at, &["stats", "robots.parquet"]).stderr.contains(note));
+    assert!(run(at, &["gate", "robots.parquet", "robots.parquet"]).stderr.contains(note));
+    run(at, &["publish", "robots.parquet", "-o", "robots"]).done();
+    assert!(readme("robots").contains("pairs claimed, not proven, in 3 of 3 scenes"), "{}", readme("robots"));
 }

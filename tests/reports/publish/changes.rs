@@ -93,7 +93,6 @@ fn change(bundle: &Path, original: &Contents, kind: usize, numbers: &mut Numbers
     let all: Vec<&String> = original.keys().filter(|name| *name != "manifest.json").collect();
     let (name, is_rewritten): (String, bool) = match kind {
         0 => ((*numbers.one_of(&all)).clone(), false),
-        1 => ((*numbers.one_of(&all)).clone(), true),
         2 => ((*numbers.one_of(&with(".csv"))).clone(), true),
         3 => ("definitions/mine.toml".to_owned(), true),
         4 => ("frames/E1-guesser.parquet".to_owned(), true),
@@ -105,11 +104,10 @@ fn change(bundle: &Path, original: &Contents, kind: usize, numbers: &mut Numbers
     };
     let path = bundle.join(&name);
     match kind {
-        0 | 1 | 8 => change_a_byte(&path, numbers),
+        5 if name.contains(".parquet") => change_an_action(&path, numbers),
+        0 | 1 | 5 | 8 => change_a_byte(&path, numbers),
         4 => change_a_frame(&path, numbers),
-        5 if name.ends_with(".parquet") => change_an_action(&path, numbers),
         9 => fs::remove_file(&path).unwrap(),
-        5 => change_a_byte(&path, numbers),
         _ => change_a_digit(&path, numbers),
     }
     if is_rewritten {
@@ -173,6 +171,26 @@ fn single_changes_are_named() {
 #[ignore = "takes minutes: make soak"]
 fn soak_a_thousand_single_changes_are_named() {
     every_change_is_named(1000, &["all", "decisive"]);
+}
+
+/// A hostile bundle: its settings name files elsewhere.
+#[test]
+fn no_setting_leads_out_of_the_folder() {
+    let folder = published("none");
+    let at = folder.path();
+    let path = at.join("out/manifest.json");
+    let sound = fs::read_to_string(&path).unwrap();
+    for (from, to) in [
+        ("\"definitions/mine.toml\"", "\"../mine.toml\""),
+        ("\"definitions/mine.toml\"", "\"mine.toml\""),
+        ("\"style\": \"default\"", "\"style\": \"/etc/passwd\""),
+    ] {
+        assert!(sound.contains(from), "{sound}");
+        fs::write(&path, sound.replacen(from, to, 1)).unwrap();
+        rewrite_manifest(&at.join("out"));
+        let told = crate::harness::program::run(at, &["verify", "out"]).ends(1).stdout;
+        assert!(told.contains("manifest.json: changed") && told.contains("a file of the bundle, found"), "{told}");
+    }
 }
 
 #[test]

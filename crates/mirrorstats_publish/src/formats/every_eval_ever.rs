@@ -146,7 +146,8 @@ fn lines(
                 "evaluation": { "score": value, "is_correct": value == 1, "num_turns": messages.len() },
                 "metadata": { "scene": scene },
             });
-            lines += &format!("{line}\n");
+            lines.push_str(&line.to_string());
+            lines.push('\n');
         }
     }
     lines

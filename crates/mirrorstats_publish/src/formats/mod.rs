@@ -5,9 +5,9 @@ mod inspect_scout;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use mirrorstats_exact::replace::{Content, FolderFiles, TemporaryFolder, folder_of, make_folder, replace_folder};
+use mirrorstats_exact::replace::{TemporaryFolder, folder_of, make_folder};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_study::Study;
 use mirrorstats_trace::episodes::episode::Episode;
@@ -17,7 +17,7 @@ use serde_json::{Map, Value};
 
 use crate::about::About;
 use crate::manifest::list;
-use crate::{Progress, PublishError};
+use crate::{Progress, PublishError, put};
 
 /// A format of another program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,9 +54,7 @@ pub fn export(
         ExportFormat::InspectScout => inspect_scout::write_all(study, stage.path())?,
     };
     let files = list(stage.path())?;
-    let staged: Vec<PathBuf> = files.iter().map(|path| stage.path().join(path)).collect();
-    let new: Vec<_> = files.iter().map(Path::new).zip(staged.iter().map(|path| Content::File(path))).collect();
-    replace_folder(out, &FolderFiles { new: &new, index: None, old: &|_| Vec::new() })?;
+    put(stage.path(), out, &files, None)?;
     Ok((files, left_out))
 }
 

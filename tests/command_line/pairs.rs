@@ -128,6 +128,7 @@ const EPISODES: Walk = Walk {
         ("figure intervals a.parquet -o figure.svg", Answer),
         ("diff paper extended a.parquet", Answer),
         ("view a.parquet --export page", Limit("episodes of a page as files")),
+        ("publish a.parquet -o bundle", Limit("episodes of a page as files")),
     ],
 };
 

@@ -10,6 +10,7 @@ use std::path::Path;
 use mirrorstats_exact::replace::TemporaryFolder;
 use mirrorstats_report::bundle::MANIFEST;
 use mirrorstats_study::findings::findings;
+use mirrorstats_study::inputs::InputError;
 use mirrorstats_study::verify::{Difference, Kind, Verification, verify as verify_hashes};
 use mirrorstats_trace::diagnostic::Severity;
 
@@ -87,6 +88,10 @@ fn add_recomputed(
         .and_then(|()| derive::derive(&base, again.path(), &manifest.settings, threads, progress));
     match made {
         Ok(derived) => found.episodes = Some(derived.episodes),
+        // A file that another program writes to says nothing about the bundle.
+        Err(PublishError::Study(error)) if matches!(error.cause(), Some(InputError::Changed { .. })) => {
+            return Err(error.into());
+        }
         Err(error) => {
             // Damage that the hashes show explains the failure.
             if found.holds() {

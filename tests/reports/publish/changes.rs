@@ -152,7 +152,8 @@ fn every_change_is_named(count: u64, frames: &[&str]) {
                     }
                     let (code, named) = named(folder.path());
                     if code != 1 || !named.contains(&name) {
-                        missed.lock().unwrap().insert(seed, (kind, name, code, named));
+                        let told = crate::harness::program::run(folder.path(), &["verify", "out"]);
+                        missed.lock().unwrap().insert(seed, (kind, name, code, named, told.stdout));
                     }
                 }
             });

@@ -23,7 +23,7 @@ lint:
 
 # As most people build it.
 check-default:
-	cargo check --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats_view \
+	cargo check --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats_publish --exclude mirrorstats_view \
 		--exclude mirrorstats_sim --exclude mirrorstats_record --exclude mirrorstats_vlm --all-targets
 
 # What the tests of `make test` need; each script says what it cannot get.
@@ -36,6 +36,7 @@ needed:
 # What the other tests need too.
 needed-others: needed
 	scripts/get-axe.sh
+	scripts/get-datasets.sh
 	scripts/get-harnesses.sh
 	scripts/get-numpy.sh
 	scripts/get-spark.sh

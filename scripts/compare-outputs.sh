@@ -76,8 +76,8 @@ run diff-own diff paper mine.toml $paper --json
 run diff-scores diff scores.parquet scores.csv
 run rescore table rescore report --definitions mine.toml --traces fixtures/paper --out rescored
 run rescore-json table rescore report --definitions extended --traces fixtures/paper --out rescored-json --json
-run verify table verify report
-run verify-json table verify report --json
+run verify verify report
+run verify-json verify report --json
 for table in main appendix; do
   run compare-$table table compare $paper --published fixtures/published/${table}_table.csv
   run compare-$table-json table compare $paper --published fixtures/published/${table}_table.csv --json

@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 # Tests that take most of the time, by parts of their names.
 long="accessible:: calibration:: cluster:: documented_command_lines documented_outputs faults:: foreign:: hostile::
   html::address html::episodes html::figures html::pair html::results html::surroundings import::inspect:: latex::
-  log::lengths logs_of_inspect_robots on_cluster pairs:: people:: seeing:: spark_ view::copy view::find
+  log::lengths logs_of_inspect_robots on_cluster pairs:: people:: publish::changes publish::opened seeing:: spark_ view::copy view::find
   view::first_screen view::labels view::live view::values world::panes"
 
 nextest=

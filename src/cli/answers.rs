@@ -18,7 +18,7 @@ pub fn printed_schema<T: JsonSchema>() -> Value {
 
 /// The schemas, each with the name of its file in `schemas/`.
 pub fn schemas() -> Vec<(&'static str, Value)> {
-    #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
+    #[cfg_attr(not(any(feature = "sim", feature = "view")), expect(unused_mut, reason = "the feature adds to them"))]
     let mut schemas = vec![
         ("definitions-check", json!(schema_for!(CheckAnswer))),
         ("experiment", Name::Experiment.document()),
@@ -35,6 +35,11 @@ pub fn schemas() -> Vec<(&'static str, Value)> {
     schemas.extend([
         ("record", printed_schema::<super::commands::record::answer::RecordAnswer>()),
         ("record-forecast", json!(schema_for!(super::commands::record::forecast::ForecastAnswer))),
+    ]);
+    #[cfg(feature = "view")]
+    schemas.extend([
+        ("publish", json!(schema_for!(super::commands::study::publish::PublishAnswer))),
+        ("publish-export", json!(schema_for!(super::commands::study::publish::ExportAnswer))),
     ]);
     schemas
 }

@@ -11,7 +11,7 @@ const EXAMPLES: &str = include_str!("../../assets/help/examples.txt");
 /// Adds a first page of one screen, and examples.
 pub fn with_help(command: Command) -> Command {
     let template = format!(
-        "{{about-with-newline}}{{usage-heading}} {{usage}}\n\n{}{}",
+        "{{about-with-newline}}{{usage-heading}} {{usage}}\n{}{}",
         first_page(&command),
         "Options: --errors text|json, --help, --version; `help COMMAND` for the rest\n"
     );
@@ -57,7 +57,7 @@ fn first_page(command: &Command) -> String {
     };
     let (nouns, verbs): (Vec<_>, Vec<_>) = command.get_subcommands().partition(|inner| inner.has_subcommands());
     let [verbs, nouns] = [verbs, nouns].map(|all| all.into_iter().map(line).collect::<String>());
-    format!("{verbs}\n{nouns}")
+    format!("{verbs}{nouns}")
 }
 
 fn title() -> String {

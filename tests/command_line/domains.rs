@@ -115,7 +115,7 @@ fn reports_statistics_figures_and_differences_know_any_domain() {
     assert!(shown.contains("5/6") && shown.contains("2/6"), "{shown}");
     let manifest: Value = serde_json::from_str(&fs::read_to_string(at.join("out/manifest.json")).unwrap()).unwrap();
     assert_eq!(manifest["definitions"]["domain"], "robots");
-    run(at, &["table", "verify", "out"]).done();
+    run(at, &["verify", "out"]).done();
     let told = asked(at, &["stats", "--by", "model,task"]);
     assert!(told.contains("pull") && told.contains("SUCCESS"), "{told}");
     let durations = asked(at, &["stats", "--tables"]);

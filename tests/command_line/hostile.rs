@@ -87,7 +87,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         &["setup", "completions", "\u{1b}]0;title\u{7}"],
         &["diff", "paper", "\u{1b}[31m", "a.parquet"],
         &["definitions", "check", "\u{1b}[31m"],
-        &["table", "verify", "\u{1b}[31m"],
+        &["verify", "\u{1b}[31m"],
         &["import", "\u{1b}[31m", "-o", "b.parquet"],
         &["trace", "recover", "\u{1b}[31m", "-o", "b.parquet"],
     ] {
@@ -126,7 +126,7 @@ const SHOWN: [&str; 27] = [
     "trace recover a.parquet -o x.parquet",
     "table compare a.parquet --published table.csv",
     "table audit table.csv --n 21",
-    "table verify reports/latest",
+    "verify reports/latest",
     "table rescore reports/latest --definitions extended --out again",
     "definitions sensitivity a.parquet",
     "world replay a.parquet",

@@ -122,12 +122,13 @@ const EPISODES: Walk = Walk {
         ("score a.parquet -o scores.csv", Answer),
         ("score a.parquet --definitions sums.toml -o s.csv", Limit("values of the definitions")),
         ("report a.parquet -o report", Answer),
-        ("table verify report", Answer),
+        ("verify report", Answer),
         ("table rescore report --definitions paper --out again", Answer),
         ("report a.parquet --by episode_id -o other", Limit("cells, groups times metrics")),
         ("figure intervals a.parquet -o figure.svg", Answer),
         ("diff paper extended a.parquet", Answer),
         ("view a.parquet --export page", Limit("episodes of a page as files")),
+        ("publish a.parquet -o bundle", Limit("episodes of a page as files")),
     ],
 };
 

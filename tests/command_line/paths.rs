@@ -58,7 +58,7 @@ fn a_path_may_be_invalid_utf8() {
         "score @ --definitions @.toml -o @.csv",
         "score @ -o @-scores.parquet",
         "report @ --definitions @.toml --style @-style.toml --out @-report",
-        "table verify @-report",
+        "verify @-report",
         "table rescore @-report --definitions @.toml --style @-style.toml --out @-again",
         "report @-scores.parquet --out @-from-scores",
         "stats @ --definitions @.toml",
@@ -132,7 +132,7 @@ fn the_name_of_a_missing_file_is_escaped() {
         "score @-none",
         "report @ --definitions @-none.toml",
         "report @ --style @-none.toml",
-        "table verify @-none",
+        "verify @-none",
         "import @-none -o x.parquet",
         "diff @-none.toml paper @",
     ] {

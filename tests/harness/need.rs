@@ -65,6 +65,13 @@ pub fn harnesses() -> PathBuf {
     packages
 }
 
+/// A folder of packages from `scripts/get-datasets.sh`, beside cargo's output.
+pub fn packages(name: &str) -> PathBuf {
+    let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name(name);
+    assert!(packages.is_dir(), "no {}: scripts/get-datasets.sh fetches it", packages.display());
+    packages
+}
+
 /// The program that compiles LaTeX to PDF.
 pub fn pdftex() -> &'static str {
     let found = Command::new("pdflatex").arg("--version").stdout(Stdio::null()).status();

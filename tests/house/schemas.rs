@@ -66,6 +66,11 @@ fn current() -> Vec<(&'static str, Value)> {
         ("verify", json!(schema_for!(Verification))),
     ];
     schemas.extend(mirrorstats::cli::schemas());
+    #[cfg(feature = "view")]
+    schemas.extend([
+        ("about", json!(schema_for!(mirrorstats_publish::about::About))),
+        ("bundle", json!(schema_for!(mirrorstats_publish::Manifest))),
+    ]);
     #[cfg(feature = "sim")]
     schemas.extend([
         ("participants-remove", json!(schema_for!(mirrorstats_record::participants::Removed))),

@@ -6,6 +6,8 @@ mod figures;
 mod harness;
 mod html;
 mod one_interval;
+#[cfg(feature = "view")]
+mod publish;
 mod reconstruction;
 mod report;
 mod sequential;

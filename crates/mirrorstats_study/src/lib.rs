@@ -42,6 +42,7 @@ mod limits;
 pub mod losses;
 pub mod overview;
 pub mod own_definitions;
+pub mod pairs;
 mod pooled;
 pub mod provenance;
 pub mod published;

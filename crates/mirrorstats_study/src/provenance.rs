@@ -85,7 +85,7 @@ pub(crate) fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
 }
 
 /// Returns true for a path inside its folder, `/` between its parts.
-pub(crate) fn is_plain(path: &str) -> bool {
+pub fn is_plain(path: &str) -> bool {
     let is_name = |part: &str| matches!(Path::new(part).components().collect::<Vec<_>>()[..], [Component::Normal(_)]);
     path.split('/').all(is_name)
 }

@@ -1,8 +1,8 @@
-//! Checks a report's files against its manifest.
+//! Checks the files of a report or of a bundle against its manifest.
 //!
 //! Rule: it never looks outside the folder, whatever the manifest says, and follows no links.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::fs::{self, Metadata};
 use std::path::Path;
@@ -26,13 +26,17 @@ struct Listed {
     _schema_version: u32,
 }
 
-/// The result of verifying a report's folder.
+/// The result of verifying a folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Verification {
     /// The number of files in the manifest.
     pub files: usize,
+    /// The number of episodes whose numbers were computed again; null for a report, which has no traces.
+    pub episodes: Option<usize>,
     /// Files that are not as the manifest says, by path.
     pub differences: Vec<Difference>,
+    /// Statements about what was not checked.
+    pub notes: Vec<String>,
 }
 
 /// A file that is not as the manifest says.
@@ -42,6 +46,8 @@ pub struct Difference {
     pub path: String,
     /// The kind of problem.
     pub kind: Kind,
+    /// The place in the file; null if only its hash is known.
+    pub cell: Option<String>,
     /// The expected value.
     pub expected: String,
     /// The value found.
@@ -72,11 +78,12 @@ pub fn verify(folder: &Path) -> Result<Verification, ProvenanceError> {
     differences.extend(there.into_iter().map(|(path, found)| Difference {
         path,
         kind: Kind::Unexpected,
+        cell: None,
         expected: "no such file".to_owned(),
         found: kind_of(&found).to_owned(),
     }));
     differences.sort_by(|a, b| a.path.cmp(&b.path));
-    Ok(Verification { files: listed.len(), differences })
+    Ok(Verification { files: listed.len(), differences, ..Verification::default() })
 }
 
 fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, ProvenanceError> {
@@ -135,8 +142,9 @@ fn difference(
     there: Option<Metadata>,
 ) -> Result<Option<Difference>, ProvenanceError> {
     let expected = format!("{} bytes with the SHA-256 {}", output.bytes, output.sha256);
-    let differs =
-        |kind, found: String| Ok(Some(Difference { path: path.to_owned(), kind, expected: expected.clone(), found }));
+    let differs = |kind, found: String| {
+        Ok(Some(Difference { path: path.to_owned(), kind, cell: None, expected: expected.clone(), found }))
+    };
     let Some(about) = there else { return differs(Kind::Missing, "no such file".to_owned()) };
     if !about.is_file() {
         return differs(Kind::Changed, kind_of(&about).to_owned());
@@ -157,14 +165,19 @@ impl Verification {
     }
 
     fn count(&self, kind: Kind) -> usize {
-        self.differences.iter().filter(|difference| difference.kind == kind).count()
+        let paths = self.differences.iter().filter(|difference| difference.kind == kind).map(|it| &it.path);
+        paths.collect::<BTreeSet<_>>().len()
     }
 }
 
 impl fmt::Display for Verification {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for Difference { path, kind, expected, found } in &self.differences {
+        for Difference { path, kind, cell, expected, found } in &self.differences {
             let path = visible(path);
+            if let Some(cell) = cell {
+                writeln!(f, "{path}: {}: expected {}, published {}", visible(cell), visible(expected), visible(found))?;
+                continue;
+            }
             match kind {
                 Kind::Changed => writeln!(f, "{path}: changed; expected {expected}, found {found}")?,
                 Kind::Missing => writeln!(f, "{path}: missing; expected {expected}")?,
@@ -174,7 +187,14 @@ impl fmt::Display for Verification {
         let files = self.files;
         if self.holds() {
             let verb = if files == 1 { "is" } else { "are" };
-            return write!(f, "{} {verb} as the manifest says", counted(files as u64, "file"));
+            write!(f, "{} {verb} as the manifest says", counted(files as u64, "file"))?;
+            return match self.episodes {
+                Some(count) => write!(f, "; all numbers of {} are equal", counted(count as u64, "episode")),
+                None => Ok(()),
+            };
+        }
+        for note in &self.notes {
+            writeln!(f, "note: {note}")?;
         }
         let [changed, missing, unexpected] =
             [Kind::Changed, Kind::Missing, Kind::Unexpected].map(|kind| self.count(kind));

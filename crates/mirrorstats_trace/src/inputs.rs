@@ -145,6 +145,9 @@ pub fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     if !path.is_dir() || is_data_set(path) {
         return Ok(vec![path.to_owned()]);
     }
+    if is_bundle(path) {
+        return traces_at(&path.join("traces"));
+    }
     let mut files = files_below(path)?;
     files.retain(|file| file.extension() == Some(OsStr::new("parquet")));
     Ok(files)
@@ -193,6 +196,11 @@ fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
 /// Returns true if `mirrorstats report` wrote the folder: its Parquet file holds scores, not steps.
 pub fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
+}
+
+/// Returns true if `mirrorstats publish` wrote the folder: its steps are in `traces`.
+fn is_bundle(folder: &Path) -> bool {
+    folder.join("croissant.json").is_file() && folder.join("manifest.json").is_file() && folder.join("traces").is_dir()
 }
 
 /// The value that marks null in the name of a folder.

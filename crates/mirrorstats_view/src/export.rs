@@ -3,7 +3,7 @@
 //! Rule: all numbers are computed during the export, so filters use only the columns of the list. Browsers load neither
 //! modules nor data from a local folder, so the script is a classic one and each part is a script.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 use super::answers::{changes, episode, list, map, overview};
 use super::found::Found;
 use super::logs::Opened;
+use super::picture::smaller;
 use super::snapshot::Together;
 use super::{Options, Snapshot, View, ViewError, page};
 use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
@@ -246,54 +247,6 @@ fn said(entry: &Value) -> Value {
     let texts = texts.filter(|(_, column)| column["is_number"] == false);
     let texts = texts.filter(|(_, column)| column["values"].as_array().into_iter().flatten().any(Value::is_string));
     texts.map(|(name, column)| (name.clone(), column["values"].clone())).collect::<serde_json::Map<_, _>>().into()
-}
-
-/// The same picture in fewer bytes: logs are written fast, a copy once. Rendered rooms have few colours and long runs,
-/// which a palette keeps and PNG filters break. Measured on frames of E1 to E5: 55 % of the bytes.
-fn smaller(frame: &[u8]) -> Option<Vec<u8>> {
-    let mut reader = png::Decoder::new(io::Cursor::new(frame)).read_info().ok()?;
-    let mut pixels = vec![0; reader.output_buffer_size()?];
-    let info = reader.next_frame(&mut pixels).ok()?;
-    if info.color_type != png::ColorType::Rgb || info.bit_depth != png::BitDepth::Eight {
-        return None;
-    }
-    pixels.truncate(info.buffer_size());
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, info.width, info.height);
-    encoder.set_compression(png::Compression::Balanced);
-    encoder.set_filter(png::Filter::NoFilter);
-    if let Some((palette, places)) = indexed(&pixels) {
-        encoder.set_color(png::ColorType::Indexed);
-        encoder.set_palette(palette);
-        encoder.write_header().ok()?.write_image_data(&places).ok()?;
-    } else {
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.write_header().ok()?.write_image_data(&pixels).ok()?;
-    }
-    (bytes.len() < frame.len()).then_some(bytes)
-}
-
-/// The palette of a picture and each pixel's index into it; `None` for more than 256 colours.
-fn indexed(pixels: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
-    let (mut palette, mut known): (Vec<u8>, HashMap<&[u8], u8>) = (Vec::new(), HashMap::new());
-    let mut places = Vec::with_capacity(pixels.len() / 3);
-    let mut last: (&[u8], u8) = (&[], 0);
-    for color in pixels.chunks_exact(3) {
-        if last.0 != color {
-            let next = u8::try_from(known.len());
-            let place = if let Some(place) = known.get(color) {
-                *place
-            } else {
-                palette.extend_from_slice(color);
-                let next = next.ok()?;
-                known.insert(color, next);
-                next
-            };
-            last = (color, place);
-        }
-        places.push(last.1);
-    }
-    Some((palette, places))
 }
 
 fn check_folder(folder: &Path) -> Result<(), ViewError> {

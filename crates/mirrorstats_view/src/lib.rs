@@ -36,6 +36,7 @@ mod filter;
 mod found;
 mod logs;
 mod page;
+pub mod picture;
 mod recent;
 #[cfg(feature = "sim")]
 mod rendered;

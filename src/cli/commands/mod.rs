@@ -14,9 +14,9 @@ pub(super) mod trace;
 #[cfg(feature = "sim")]
 pub(super) mod world;
 
+use study::{diff, figure, gate, plan, query, report, score, stats, verify};
 #[cfg(feature = "view")]
-use study::view;
-use study::{diff, figure, gate, plan, query, report, score, stats};
+use study::{publish, view};
 
 use super::outcome::{Failure, Outcome};
 
@@ -31,6 +31,9 @@ pub enum Command {
     Figure(figure::FigureArgs),
     Diff(diff::DiffArgs),
     Gate(gate::GateArgs),
+    #[cfg(feature = "view")]
+    Publish(publish::PublishArgs),
+    Verify(verify::VerifyArgs),
     #[cfg(feature = "sim")]
     Record(Box<record::RecordArgs>),
     Import(trace::import::ImportArgs),
@@ -67,6 +70,9 @@ impl Command {
             Self::Figure(args) => args.run(),
             Self::Diff(args) => args.run(),
             Self::Gate(args) => args.run(),
+            #[cfg(feature = "view")]
+            Self::Publish(args) => args.run(),
+            Self::Verify(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Record(args) => args.run(),
             Self::Import(args) => args.run(),

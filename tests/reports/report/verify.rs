@@ -1,4 +1,4 @@
-//! `mirrorstats table verify`: a report's folder against its manifest.
+//! `mirrorstats verify`: a report's folder against its manifest.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn reported() -> TempDir {
 }
 
 fn differences(folder: &Path) -> Vec<(String, String)> {
-    let answer = run(folder, &["table", "verify", "mine", "--json"]);
+    let answer = run(folder, &["verify", "mine", "--json"]);
     let found: Value = serde_json::from_str(&answer.stdout).unwrap();
     let found = found["differences"].as_array().unwrap();
     assert_eq!(answer.code, i32::from(!found.is_empty()));
@@ -31,7 +31,7 @@ fn every_file_that_differs_is_named() {
     let folder = reported();
     let at = folder.path();
     assert_eq!(differences(at), []);
-    let told = run(at, &["table", "verify", "mine"]).done();
+    let told = run(at, &["verify", "mine"]).done();
     assert!(told.ends_with(" files are as the manifest says\n"), "{told}");
     let mut table = fs::read(at.join("mine/tables/main.csv")).unwrap();
     *table.last_mut().unwrap() ^= 1;
@@ -41,7 +41,7 @@ fn every_file_that_differs_is_named() {
     fs::write(at.join("mine/more/notes.txt"), "mine").unwrap();
     let expected = [("missing", "cells.csv"), ("unexpected", "more/notes.txt"), ("changed", "tables/main.csv")];
     assert_eq!(differences(at), expected.map(|(kind, path)| (kind.to_owned(), path.to_owned())));
-    let told = run(at, &["table", "verify", "mine"]).ends(1).stdout;
+    let told = run(at, &["verify", "mine"]).ends(1).stdout;
     for words in
         ["cells.csv: missing", "more/notes.txt: unexpected", "tables/main.csv: changed", "1 changed, 1 missing"]
     {
@@ -67,11 +67,11 @@ fn no_link_is_followed() {
     assert!(found.contains(&("changed".to_owned(), "cells.csv".to_owned())), "{found:?}");
     assert!(found.contains(&("unexpected".to_owned(), "tables".to_owned())), "{found:?}");
     assert!(found.contains(&("missing".to_owned(), "tables/main.csv".to_owned())), "{found:?}");
-    let told = run(at, &["table", "verify", "mine"]).ends(1).stdout;
+    let told = run(at, &["verify", "mine"]).ends(1).stdout;
     assert!(told.contains("a symbolic link"), "{told}");
     fs::rename(at.join("mine/manifest.json"), at.join("manifest.json")).unwrap();
     std::os::unix::fs::symlink(at.join("manifest.json"), at.join("mine/manifest.json")).unwrap();
-    let told = run(at, &["table", "verify", "mine"]).refused();
+    let told = run(at, &["verify", "mine"]).refused();
     assert!(told.contains("found a symbolic link"), "{told}");
 }
 
@@ -100,16 +100,16 @@ fn a_manifest_with_impossible_entries_is_refused() {
         let mut manifest = sound.clone();
         manifest["outputs"] = outputs;
         fs::write(at.join("mine/manifest.json"), manifest.to_string()).unwrap();
-        let told = run(at, &["table", "verify", "mine"]).refused();
+        let told = run(at, &["verify", "mine"]).refused();
         assert!(told.contains(expected) && told.contains("manifest.json"), "{told}");
     }
     for bytes in [&b"{"[..], b"", b"{\"outputs\": []}", b"\xff\xfe"] {
         fs::write(at.join("mine/manifest.json"), bytes).unwrap();
-        let told = run(at, &["table", "verify", "mine"]).refused();
+        let told = run(at, &["verify", "mine"]).refused();
         assert!(told.contains("expected the manifest of a report"), "{told}");
     }
     for folder in [".", "nowhere", "mine/cells.csv"] {
-        let told = run(at, &["table", "verify", folder]).refused();
+        let told = run(at, &["verify", folder]).refused();
         assert!(told.contains("expected a report's folder with its manifest.json"), "{told}");
     }
 }

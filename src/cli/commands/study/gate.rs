@@ -6,6 +6,7 @@ use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs, TraceArgs, number}
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::gate::{GateFormat, GateOptions, GateVerdict};
 use mirrorstats_study::gate::{gate, leading_metric};
+use mirrorstats_study::pairs::claimed;
 
 /// Compare new episodes with old ones: improved, held, regressed, cannot say
 ///
@@ -70,6 +71,7 @@ impl GateArgs {
         let grouping = GroupingArgs { pool: self.pool, ..GroupingArgs::default() };
         let open = |name| side(name).study(&scoring, &grouping);
         let (base, new) = (open(&self.base)?, open(&self.new)?);
+        output::notes(claimed(&base).or_else(|| claimed(&new)).as_slice());
         let metric = match self.metric {
             Some(metric) => metric,
             None => leading_metric(&new)?,

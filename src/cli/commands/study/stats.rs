@@ -8,6 +8,7 @@ use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::statistics::text::Length;
 use mirrorstats_analysis::statistics::{Options, Sequential, Statistics};
 use mirrorstats_exact::suggest::hint;
+use mirrorstats_study::pairs::claimed;
 use mirrorstats_study::statistics::{sequential, statistics};
 
 const ALL: &str = "all";
@@ -58,6 +59,7 @@ impl StatsArgs {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let study = with_plan(self.traces.study(&scoring, &self.grouping)?, self.plan.as_deref())?;
+        output::notes(claimed(&study).as_slice());
         let (confidence, margin, improvements) = (self.confidence, self.margin, self.full || self.json);
         let options = Options { confidence, margin, improvements, ..Options::default() };
         if self.sequential {

@@ -164,6 +164,7 @@ fn files_below(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
             continue;
         }
         if entry.file_type().map_err(failed)?.is_dir() {
+            let below = if is_bundle(&below) { below.join("traces") } else { below };
             if !is_report(&below) {
                 files.extend(files_below(&below)?);
             }

@@ -126,9 +126,12 @@ impl<'m> Rows<'m> {
         let (mapping, row) = (self.mapping, scopes.last().map(|scope| scope.value));
         let members = row.and_then(Value::as_object).into_iter().flatten();
         let mut skipped = mapping.settings.skip.iter();
-        let is_there = |(path, value): &(&String, &Value)| match path.ends_with('#') {
-            true => find(path, scopes) == Cell::of_json(value),
-            false => scopes.iter().rev().find_map(|scope| scope.find(path)) == Some(*value),
+        let is_there = |(path, value): &(&String, &Value)| {
+            if path.ends_with('#') {
+                find(path, scopes) == Cell::of_json(value)
+            } else {
+                scopes.iter().rev().find_map(|scope| scope.find(path)) == Some(*value)
+            }
         };
         if let Some((path, value)) = skipped.find(is_there) {
             self.notes.count(format!("rows whose `{path}` is {value}"), 1);

@@ -33,6 +33,7 @@ fn rows_follow_from_one_another() {
     let expected = [
         "participant",
         "start_distance",
+        "unreadable_answers",
         "shown_color",
         "reply_repair",
         "reply_fault",

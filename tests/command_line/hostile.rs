@@ -105,7 +105,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
 }
 
 /// Every verb that shows names of a trace, in every format for people.
-const SHOWN: [&str; 27] = [
+const SHOWN: [&str; 29] = [
     "report a.parquet b.parquet",
     "stats a.parquet --metric all",
     "figure intervals a.parquet -o figure.svg",
@@ -126,6 +126,8 @@ const SHOWN: [&str; 27] = [
     "trace recover a.parquet -o x.parquet",
     "table compare a.parquet --published table.csv",
     "table audit table.csv --n 21",
+    "publish a.parquet -o bundle",
+    "verify bundle",
     "verify reports/latest",
     "table rescore reports/latest --definitions extended --out again",
     "definitions sensitivity a.parquet",

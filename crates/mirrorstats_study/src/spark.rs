@@ -71,7 +71,7 @@ impl SparkJob {
     }
 }
 
-/// The episode table, computed by Spark, and with `for_a_file` as a file keeps it ([`scores::score`](crate::scores::score)). Lost episodes, which
+/// The episode table, computed by Spark, and with `for_a_file` as a file keeps it ([`scores::score`]). Lost episodes, which
 /// Spark does not know, and hashes of steps come from a scan. Errors: as
 /// [`Study::score`]; scores in the place of traces; faults of Spark.
 pub fn score_on(study: &Study, cluster: Cluster, for_a_file: bool) -> Result<EpisodeTable, StudyError> {

@@ -20,6 +20,7 @@ mod guess;
 mod index;
 mod json;
 mod mapping;
+mod notes;
 mod rows;
 pub mod schema;
 mod spelling;
@@ -38,7 +39,8 @@ pub use columns::Own;
 pub use error::{Fault, ImportError};
 pub use format::Format;
 pub use guess::{Draft, guess};
-pub use mapping::{Mapping, MappingError, Notes};
+pub use mapping::{Mapping, MappingError};
+pub use notes::Notes;
 pub use text::Text;
 
 use columns::Columns;

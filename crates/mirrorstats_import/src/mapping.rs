@@ -2,7 +2,6 @@
 //!
 //! A mapping is data: a file of a user or one in `assets/import`, and `--map` and `--set` on top of it.
 
-use std::collections::BTreeMap;
 use std::path::Path as FilePath;
 use std::sync::Arc;
 
@@ -129,37 +128,6 @@ pub struct MappingError {
 impl MappingError {
     fn of_file(place: String, found: &str) -> Self {
         Self { place, expected: "a format, or a mapping file with `[import]`", found: found.trim_end().into() }
-    }
-}
-
-/// What was left out, and how often.
-#[derive(Clone, Debug, Default)]
-pub struct Notes {
-    nested: BTreeMap<String, u64>,
-    dropped: BTreeMap<String, u64>,
-}
-
-impl Notes {
-    /// A note for each key with lists or objects that were left out, and for each kind of record that is not a step.
-    pub fn texts(&self) -> Vec<String> {
-        let nested = |(key, rows): (&String, &u64)| {
-            format!(
-                "left out: `{}`, a list or an object in {rows} lines; `--map COLUMN={0}.PATH` takes a value out of it",
-                visible(key)
-            )
-        };
-        let dropped = |(what, count): (&String, &u64)| format!("left out: {count} {}", visible(what));
-        self.nested.iter().map(nested).chain(self.dropped.iter().map(dropped)).collect()
-    }
-
-    pub(super) fn leave_out(&mut self, key: &str, rows: u64) {
-        *self.nested.entry(key.to_owned()).or_default() += rows;
-    }
-
-    pub(super) fn count(&mut self, what: String, count: u64) {
-        if count > 0 {
-            *self.dropped.entry(what).or_default() += count;
-        }
     }
 }
 

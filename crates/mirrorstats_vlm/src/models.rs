@@ -477,7 +477,6 @@ mod tests {
         assert!(most("max_output_tokens = 0").unwrap_err().contains("own.toml"));
         let fault = most("reasoning_effort = \"hard\"").unwrap_err();
         assert!(fault.contains("`hard`") && fault.contains("minimal"), "{fault}");
-        // Of the paper's models, those that reason by default.
         let models = Models::load(None).unwrap().model;
         let [reasons, replies] = ["Gemini 2.5 Pro", "Ministral 3 14B"].map(|name| models[name].max_output_tokens());
         assert!(reasons > 2_048 && replies == 2_048);

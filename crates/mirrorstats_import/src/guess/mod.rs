@@ -15,7 +15,8 @@ use mirrorstats_trace::schema::{Kind, column};
 
 use super::error::{Fault, ImportError};
 use super::format::Format;
-use super::mapping::{Mapping, Notes};
+use super::mapping::Mapping;
+use super::notes::Notes;
 use super::spelling;
 use super::text::Text;
 use super::value::Cell;

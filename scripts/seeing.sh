@@ -51,10 +51,13 @@ END
   echo
   sed -n '1p' "$work/report/tables/main.md"
   printf '\n## What it shows\n\n'
-  "$PROGRAM" query "select model, experiment, sum(TSA) as right, count(*) as of from episodes group by model, experiment" \
-    "$work/runs" --format csv | python3 -c '
-import csv, sys
-rows = {(row["model"], row["experiment"]): row["right"] + " of " + row["of"] for row in csv.DictReader(sys.stdin)}
+  "$PROGRAM" score "$work/runs" 2>/dev/null | python3 -c '
+import collections, csv, sys
+values = collections.defaultdict(list)
+for row in csv.DictReader(sys.stdin):
+    values[row["model"], row["experiment"]].append(row["TSA"])
+counts = {cell: (found.count("1"), len(found)) for cell, found in values.items()}
+rows = {cell: f"{right} of {of}" for cell, (right, of) in counts.items()}
 for name in ("seeing", "seeing-trained"):
     counts = ", ".join(f"{rows[name, experiment]} in {experiment}" for experiment in ("E1", "E2", "E3", "E4", "E5"))
     print(f"- `{name}` decides correctly in {counts}.")'

@@ -175,6 +175,10 @@ impl Mapping {
 
     fn of_text(text: &str) -> Result<Self, String> {
         let MappingFile { import: settings } = toml::from_str(text).map_err(|error| error.to_string())?;
+        let is_optional = |name: &String| column(name).is_some_and(|column| column.is_of_some_tasks);
+        if let Some(name) = settings.absent.iter().find(|name| !is_optional(name)) {
+            return Err(format!("`absent` with `{name}`, which every trace has"));
+        }
         let known = |name: &String| Format::named(name).ok_or_else(|| format!("the unknown format `{name}`"));
         let column = |(name, entry): (&String, &Value)| {
             let source = Source::of(entry).map_err(|found| format!("{found} for the column `{name}`"))?;

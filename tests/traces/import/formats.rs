@@ -246,7 +246,7 @@ fn a_lerobot_data_set_of_version_2_has_its_tasks_and_counts_in_lines() {
     assert_eq!(run(at, &import("pusht", &SET)).done(), expected);
     #[cfg(feature = "polars")]
     assert_eq!(queried(at, "task, fps")[0], "Push the block,10");
-    // The folder stands for its trace, with a definition file that says what the data set does not.
+    // The folder is read where a trace is, with a definition file for the columns that the data set lacks.
     let mapping = "[import]\nformat = \"lerobot\"\n[import.columns]\nmodel = { value = \"act\" }\nseed = 1\n\
                    experiment = { value = \"reach\" }\n";
     fs::write(at.join("with.toml"), format!("{DEFINITIONS}{mapping}")).unwrap();
@@ -293,6 +293,9 @@ fn results_of_mirrorbench_score_as_their_own_metrics_say() {
     assert!(answer.stderr.contains("left out: 2 rows whose `#` is 0"), "{}", answer.stderr);
     assert_eq!(scored(&["x.parquet", "--definitions", "reach"]), expected);
     assert!(run(at, &["trace", "validate", "x.parquet"]).done().contains("0 errors"));
+    fs::write(at.join("own.toml"), "[import]\nabsent = [\"episode_id\"]\n").unwrap();
+    let told = run(at, &["import", files[0], "--from", "own.toml", "-o", "y.parquet"]).refused();
+    assert!(told.contains("`absent` with `episode_id`, which every trace has"), "{told}");
     // The model and the level are in the folders.
     fs::copy(at.join(files[0]), at.join("a.json")).unwrap();
     let told = run(at, &["import", "a.json", "-o", "y.parquet"]).refused();

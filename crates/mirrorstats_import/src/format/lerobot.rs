@@ -1,5 +1,6 @@
 //! LeRobot's frames: files below `data`, and the folder of a data set with `meta/info.json`, tasks and episodes, which are
-//! Parquet in version 3 and JSON Lines in version 2. Only what a mapping cannot say is here: distances of actions, tasks and counts in other files.
+//! Parquet in version 3 and JSON Lines in version 2. Only what a mapping cannot say is here: distances of actions, tasks
+//! and counts in other files.
 
 use std::collections::BTreeMap;
 use std::fs::File;

@@ -106,14 +106,9 @@ impl Format {
         !matches!(self, Self::JsonLines | Self::Json | Self::Csv | Self::Parquet)
     }
 
-    /// The built-in definitions of the domain that its files are about.
-    pub(super) const fn definitions(self) -> Option<&'static str> {
-        match self {
-            Self::Inspect | Self::Atif => Some("tools"),
-            Self::InspectRobots | Self::LeRobot | Self::VlaEval => Some("robots"),
-            Self::MirrorBench => Some("reach"),
-            Self::JsonLines | Self::Json | Self::Csv | Self::Parquet => None,
-        }
+    /// The built-in definitions for which its files have every column; `None` where that depends on the file.
+    pub(super) fn definitions(self) -> Option<&'static str> {
+        (self == Self::MirrorBench).then_some("reach")
     }
 
     /// The mapping of the format, if it has one.

@@ -248,7 +248,8 @@ def _space(texts: Optional[list[str]]) -> spaces.Space[Any]:
 
 def _number(name: str, value: Any, least: int) -> int:
     if not isinstance(value, (int, numpy.integer)) or isinstance(value, bool) or not least <= value < 2**31:
-        raise ValueError(f"{name}: expected a whole number from {least} to {2**31 - 1}, found {value!r}")
+        words = f"{name}: expected a whole number from {least} to {2**31 - 1}, as a trace stores it, found {value!r}"
+        raise ValueError(f"{words}\n  help: for a larger {name}, give {name} % 2**31")
     return int(value)
 
 

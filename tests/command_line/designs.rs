@@ -51,7 +51,7 @@ fn is_named_everywhere(design: &str, question: &str, words: &str) {
     }
     let out = tempfile::tempdir().unwrap();
     let to = out.path().join("report");
-    let report = run(&at, &["report", design, "--no-figures", "--out", to.to_str().unwrap()]);
+    let report = run(&at, &["report", design, "--out", to.to_str().unwrap()]).ends(0);
     assert!(report.stderr.contains(words), "{design}: {}", report.stderr);
     let check = run(&at, &["trace", "check", design, "--design"]).ends(1);
     assert!(check.stdout.replace("\n    ", " ").contains(words), "{design}: {}", check.stdout);

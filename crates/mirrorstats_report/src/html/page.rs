@@ -25,7 +25,10 @@ use mirrorstats_statistics::intervals::interval::Interval;
 use mirrorstats_tables::{DAGGER, Emphasis, ListTable};
 
 pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
-    if group(page.episodes, &page.cells.by)? != *page.cells {
+    // A cell whose episodes were all lost has no row in the table.
+    let mut occupied = page.cells.clone();
+    occupied.groups.retain(|group| group.episodes > 0);
+    if group(page.episodes, &page.cells.by)? != occupied {
         return Err(HtmlError::OtherEpisodes);
     }
     let undefined = page.tables.first().map_or("", |table| table.undefined.as_str());

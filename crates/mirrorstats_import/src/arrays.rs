@@ -169,6 +169,12 @@ pub(super) fn array<'a>(values: impl IntoIterator<Item = Cell<'a>>) -> ArrayRef 
     array_of(&column.values, &column.kind)
 }
 
+/// A column with this value in every row.
+pub(super) fn repeated(value: Cell<'_>, rows: usize) -> ArrayRef {
+    let once = array([value]);
+    take(&once, &UInt32Array::from(vec![0; rows]), None).expect("the position of the only value is valid")
+}
+
 fn array_of(values: &[Cell<'_>], kind: &DataType) -> ArrayRef {
     let texts = || values.iter().map(Cell::text);
     let valid = || Some(values.iter().map(|value| *value != Cell::Null).collect::<NullBuffer>());

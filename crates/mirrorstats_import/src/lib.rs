@@ -13,6 +13,7 @@
 //! `identification` and no key `self_color` get it from the text.
 
 mod arrays;
+mod beside;
 mod columns;
 mod error;
 mod format;
@@ -23,6 +24,7 @@ mod mapping;
 mod notes;
 mod rows;
 pub mod schema;
+mod source;
 mod spelling;
 mod spool;
 mod text;
@@ -53,6 +55,7 @@ use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::colors::palette::Palette;
 use mirrorstats_trace::schema::{DeclaredColumn, Kind};
 use mirrorstats_trace::validate::{Expected, validate_as};
+use text::Steps;
 use write::write;
 
 /// Limits on the values of steps beyond the schema, and the trace's declarations about them.
@@ -83,7 +86,7 @@ impl Limits<'_> {
 
     fn recording(&self, texts: &[Text]) -> serde_json::Value {
         let steps = || texts.iter().filter_map(|text| text.read.as_ref());
-        let sources: Vec<&str> = steps().map(|steps| steps.sha256.as_str()).collect();
+        let sources: Vec<&str> = steps().flat_map(Steps::hashes).collect();
         let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
         let mut recording = json!({ "kind": origin.name(), "sources": sources });
         if let Some(domain) = self.domain {

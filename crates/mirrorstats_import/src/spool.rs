@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Seek as _, SeekFrom, Write as _};
+use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::error::ArrowError;
@@ -20,6 +21,8 @@ pub(super) struct Spool {
 pub(super) struct Batch {
     offset: u64,
     pub(super) lines: Lines,
+    /// The file of the lines, if it is another one beside the source.
+    pub(super) beside: Option<Arc<str>>,
 }
 
 /// The line of each row, from 1; blank lines count.
@@ -49,14 +52,14 @@ impl Spool {
         Ok(Self { file: tempfile::tempfile()?, batches: Vec::new(), bytes: 0 })
     }
 
-    pub(super) fn add(&mut self, rows: &RecordBatch, lines: Lines) -> Result<(), ArrowError> {
+    pub(super) fn add(&mut self, rows: &RecordBatch, lines: Lines, beside: Option<Arc<str>>) -> Result<(), ArrowError> {
         let mut bytes = Vec::new();
         let mut writer = StreamWriter::try_new(&mut bytes, rows.schema_ref())?;
         writer.write(rows)?;
         writer.finish()?;
         drop(writer);
         self.file.write_all(&bytes)?;
-        self.batches.push(Batch { offset: self.bytes, lines });
+        self.batches.push(Batch { offset: self.bytes, lines, beside });
         self.bytes += bytes.len() as u64;
         Ok(())
     }

@@ -39,7 +39,7 @@ impl Rows {
         let Some((list, inner)) = lists.split_first() else {
             return self.push(values);
         };
-        for item in crate::mapping::at(value, list).and_then(Value::as_array).into_iter().flatten() {
+        for item in crate::source::at(value, list).and_then(Value::as_array).into_iter().flatten() {
             self.add(item, inner, &values);
         }
     }

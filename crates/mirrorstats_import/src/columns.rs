@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use arrow::array::{Array as _, ArrayRef, RecordBatch};
 use indexmap::IndexMap;
 
-use super::arrays::{array, table};
+use super::arrays::{array, changes, repeated, table};
 use super::error::{Fault, Location};
 use super::mapping::Order;
 use super::value::Cell;
@@ -79,7 +79,7 @@ impl Columns {
         for (name, value) in folders {
             let value = value.as_ref().map_or(Cell::Null, |value| Cell::Spelled(value.into()));
             let Some(values) = rows.column_by_name(name) else {
-                added.push((name.clone(), array(vec![value; rows.num_rows()])));
+                added.push((name.clone(), repeated(value, rows.num_rows())));
                 continue;
             };
             let kind = limits.kind(name);
@@ -187,13 +187,11 @@ impl Columns {
         if declared.is_none() && inferred.is_of(values) {
             return Vec::new();
         }
-        let mut faults = Vec::new();
-        for row in 0..values.len() {
+        each_change(values, |row| {
             let value = Cell::at(values, row).typed(declared.map(|declared| declared.kind));
             let fault = declared.and_then(|declared| misdeclared(declared, &value));
-            faults.extend(fault.or_else(|| inferred.take(&value, &|| place(row))).map(|fault| (row, fault)));
-        }
-        faults
+            fault.or_else(|| inferred.take(&value, &|| place(row)))
+        })
     }
 }
 
@@ -295,11 +293,22 @@ fn misfits(column: &Column, values: &ArrayRef, order: Order, limits: Limits<'_>)
     let Limits { expected, palette, .. } = limits;
     let rules = rules_of(column, Known { palette, experiments: expected.experiments });
     let is_ordered = column.name == "t" && order != Order::Numbers;
-    let fault = |row| {
+    each_change(values, |row| {
         let value = Cell::at(values, row).typed(column.stored.kind());
         if is_ordered && value.int().is_some() { None } else { misfit(column, &value, &rules) }
-    };
-    (0..values.len()).filter_map(|row| Some((row, fault(row)?))).collect()
+    })
+}
+
+/// The faults of all rows, given the check of a row. A value that repeats the one before is not checked again.
+fn each_change(values: &ArrayRef, mut fault: impl FnMut(usize) -> Option<Fault>) -> Vec<(usize, Fault)> {
+    let (mut faults, mut last) = (Vec::new(), None);
+    for (row, is_new) in changes(values).iter().enumerate() {
+        if is_new {
+            last = fault(row);
+        }
+        faults.extend(last.clone().map(|fault| (row, fault)));
+    }
+    faults
 }
 
 fn misfit(column: &Column, value: &Cell<'_>, rules: &[Rule<'_>]) -> Option<Fault> {

@@ -136,7 +136,7 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     file.commit().map_err(|error| TraceError::write(out, error))?;
     Ok(Imported {
         episodes: steps.chunk_by(|a, b| a.episode == b.episode).count(),
-        steps: steps.len(),
+        steps: write::count(&steps),
         columns: columns.known().map(|column| column.name).collect(),
         own: columns.own(),
     })
@@ -167,7 +167,7 @@ fn survey(
         let (rows, mut found) = columns.completed(&text.batch(batch)?, &text.folders, limits);
         found.extend(columns.check(&rows, &place, (order, &absent), limits));
         let refused: HashSet<usize> = found.iter().map(|(row, _)| *row).collect();
-        found.extend(index.add((at, batch), &rows, place, |row| refused.contains(&row)));
+        found.extend(index.add((at, batch, order), &rows, place, |row| refused.contains(&row)));
         found.sort_by_key(|(row, _)| *row);
         faults.extend(found.into_iter().map(|(row, fault)| text.of_folder(fault).at(&place(row))));
     }
@@ -176,5 +176,6 @@ fn survey(
 
 fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {
     let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
-    Ok(validate_as(&[input], Expected { errors_alone: true, ..expected }, NonZeroUsize::MIN)?.errors()?)
+    let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    Ok(validate_as(&[input], Expected { errors_alone: true, ..expected }, threads)?.errors()?)
 }

@@ -253,8 +253,7 @@ fn attribution(text: Cell<'_>) -> Cell<'static> {
 
 /// Returns true if a value equals that of a folder's name, whose type may be unknown.
 fn is_same(value: &Cell<'_>, folder: &Cell<'_>) -> bool {
-    let kind = kind_of(value).ok().flatten();
-    value == folder || kind.is_some_and(|kind| folder.clone().typed(kind) == value.clone().typed(kind))
+    value == folder || value.kind().is_some_and(|kind| folder.clone().typed(kind) == value.clone().typed(kind))
 }
 
 fn integer(value: &Cell<'_>) -> Option<i64> {
@@ -275,17 +274,12 @@ fn named(kind: Kind) -> &'static str {
 
 fn kind_of(value: &Cell<'_>) -> Result<Option<Kind>, Box<Fault>> {
     match value {
-        Cell::Null => Ok(None),
-        Cell::Bool(_) => Ok(Some(Kind::Bool)),
-        Cell::Int(_) => Ok(Some(Kind::Int)),
-        Cell::Float(_) => Ok(Some(Kind::Float)),
-        Cell::Text(_) => Ok(Some(Kind::String)),
-        Cell::Spelled(text) => Ok(Some(spelling::kind_of(text))),
         Cell::Unheld(_) => Err(Box::new(Fault::new(spelling::held(), value.shown(), UNHELD))),
         Cell::List | Cell::Object => {
             let help = "give its parts keys of their own, write it as text, or leave it out";
             Err(Box::new(Fault::new("null, true or false, a number or a text", value.shown(), help)))
         }
+        value => Ok(value.kind()),
     }
 }
 

@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::{panic, thread};
 
 use arrow::array::{Int32Array, RecordBatch, UInt32Array, new_null_array};
 use arrow::compute::{concat_batches, take_record_batch};
@@ -22,7 +24,7 @@ use mirrorstats_exact::replace::NewFile;
 use mirrorstats_identification::put_version;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::schema::Kind;
-use mirrorstats_trace::write::row_groups::{RowGroups, field};
+use mirrorstats_trace::write::row_groups::{Filling, RowGroups, field};
 
 /// Writes the rows to a temporary file beside `out`.
 pub(super) fn write(
@@ -44,18 +46,25 @@ pub(super) fn write(
     let failed = |error: ParquetError| TraceError::write(out, error);
     let (fields, kinds): (Vec<_>, Vec<_>) = fields(columns, limits).unzip();
     let layout = Arc::new(Schema::new(fields));
-    let mut file = RowGroups::new(file, &layout, Some(&recording)).map_err(failed)?;
+    let file = RowGroups::new(file, &layout, Some(&recording)).map_err(failed)?;
     let mut gathering = Gathering { texts, columns, limits, layout, kinds, last: None };
-    let (mut start, mut end, mut rows) = (0, 0, 0);
-    for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
-        end += episode.len();
-        rows += count(episode);
-        if file.is_due(rows) || end == steps.len() {
-            file.write(&gathering.rows(&steps[start..end])?).map_err(failed)?;
-            (start, rows) = (end, 0);
-        }
+    // Reading rows and compressing them take about as long.
+    let (sender, receiver) = mpsc::sync_channel(1);
+    let (gathered, written) = thread::scope(|scope| {
+        let writer = scope.spawn(move || written(file, receiver));
+        let gathered = gathering.send(steps, &sender);
+        drop(sender);
+        (gathered, writer.join().unwrap_or_else(|panic| panic::resume_unwind(panic)))
+    });
+    gathered?;
+    Ok(written.map_err(failed)?)
+}
+
+fn written(mut file: RowGroups<NewFile>, batches: Receiver<RecordBatch>) -> Result<NewFile, ParquetError> {
+    for rows in batches {
+        file.write(&rows)?;
     }
-    Ok(file.finish(None).map_err(failed)?)
+    file.finish(None)
 }
 
 /// The columns of the trace. A declared type holds whole numbers of a float column, and columns of nulls. A column of
@@ -83,6 +92,24 @@ struct Gathering<'a> {
 }
 
 impl Gathering<'_> {
+    /// Gives the rows of whole episodes to the writer, which may have failed.
+    fn send(&mut self, steps: &[IndexedSteps], writer: &SyncSender<RecordBatch>) -> Result<(), ImportError> {
+        let (mut start, mut end, mut rows) = (0, 0, 0);
+        let mut row_group = Filling::default();
+        for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
+            end += episode.len();
+            rows += count(episode);
+            if row_group.is_due(rows) || end == steps.len() {
+                if writer.send(self.rows(&steps[start..end])?).is_err() {
+                    return Ok(());
+                }
+                row_group.add(rows);
+                (start, rows) = (end, 0);
+            }
+        }
+        Ok(())
+    }
+
     /// The rows of these steps in their order. Each batch is read once, however scattered its rows are.
     fn rows(&mut self, steps: &[IndexedSteps]) -> Result<RecordBatch, ImportError> {
         let mut by_batch: BTreeMap<(u32, u32), Vec<(usize, IndexedSteps)>> = BTreeMap::new();

@@ -11,7 +11,7 @@ use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::{hash, input};
 use mirrorstats_trace::inputs::Input;
 
-use super::error::ImportError;
+use super::error::{Fault, ImportError};
 use super::notes::Notes;
 
 #[derive(Debug, Default)]
@@ -32,33 +32,28 @@ pub(super) struct StepFile {
     pub(super) bytes: u64,
 }
 
-/// A path that a log cannot have for the steps of a row.
-#[derive(Debug)]
-pub(super) struct WrongPath {
-    pub(super) expected: &'static str,
-    pub(super) found: String,
-}
-
 impl Beside {
     pub(super) fn new(folder: Option<PathBuf>) -> Self {
         Self { folder, ..Self::default() }
     }
 
-    /// Opens the file at this path in the folder; `None` if it is missing.
-    pub(super) fn open(&mut self, path: &str) -> Result<Result<Option<StepFile>, WrongPath>, ImportError> {
-        let wrong =
-            |expected, words: &str| Ok(Err(WrongPath { expected, found: format!("`{}`{words}", visible(path)) }));
+    /// Opens the file that a row of the log names by its path in the folder; `None` if it is missing.
+    pub(super) fn open(&mut self, path: &str, row: &str) -> Result<Option<StepFile>, ImportError> {
+        let refused = |expected: &str, words: &str| {
+            let found = format!("`{}`{words}", visible(path));
+            Fault { file: row.to_owned(), ..Fault::new(expected, found, "correct the log, or copy it again") }
+        };
         // A log must not make the import read any file of the user.
         if !Path::new(path).components().all(|part| matches!(part, Component::Normal(_))) {
-            return wrong("a path below the folder of the log, with the steps of the row", "");
+            return Err(refused("a path below the folder of the log, with the steps of the row", "").into());
         }
         if self.hashes.contains_key(path) {
-            return wrong("a file of steps of its own for each row", " again");
+            return Err(refused("a file of steps of its own for each row", " again").into());
         }
         let Some(at) = self.folder.as_ref().map(|folder| folder.join(path)).filter(|at| at.exists()) else {
             self.missing += 1;
             self.first_missing.get_or_insert_with(|| path.to_owned());
-            return Ok(Ok(None));
+            return Ok(None);
         };
         let name = Input::new(&at).name;
         let read = || -> io::Result<(File, u64, String)> {
@@ -69,7 +64,7 @@ impl Beside {
         };
         let (file, bytes, sha256) = read().map_err(ImportError::read(&name))?;
         self.hashes.insert(path.to_owned(), sha256);
-        Ok(Ok(Some(StepFile { name, file, bytes })))
+        Ok(Some(StepFile { name, file, bytes }))
     }
 
     /// The hash of all files that were read, with their paths; `None` if there were none.

@@ -8,7 +8,7 @@ use indexmap::IndexMap;
 use serde_json::Value;
 
 use super::arrays::{Builder, Unreadable, table};
-use super::beside::{Beside, StepFile, WrongPath};
+use super::beside::{Beside, StepFile};
 use super::columns::TEXT;
 use super::error::{Fault, Faults, ImportError};
 use super::mapping::{Given, Mapping};
@@ -146,12 +146,10 @@ impl<'m> Rows<'m> {
 
     /// The file of the steps of the row in the last scope; `None` if the row has none, or if it is missing.
     pub(super) fn steps_beside(&mut self, scopes: &[Scope<'_>], line: u64) -> Result<Option<StepFile>, ImportError> {
-        let pattern = self.mapping.steps.as_ref();
-        let path = pattern.and_then(|steps| steps.filled(steps.paths().map(|path| find(&path.keys, scopes))));
-        let Some(path) = path else { return Ok(None) };
-        self.beside.open(&path)?.map_err(|WrongPath { expected, found }| {
-            self.fault(&format!("{} {line}", self.noun), expected, found, "correct the log, or copy it again")
-        })
+        let Some(steps) = &self.mapping.steps else { return Ok(None) };
+        let Some(path) = steps.filled(steps.paths().map(|path| find(&path.keys, scopes))) else { return Ok(None) };
+        let row = format!("{}, {} {line}", self.file, self.noun);
+        self.beside.open(&path, &row)
     }
 
     /// Reads the rows of the file with the steps of a row, and returns their number.

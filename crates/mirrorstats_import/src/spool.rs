@@ -13,7 +13,6 @@ use arrow::ipc::writer::StreamWriter;
 pub(super) struct Spool {
     file: File,
     pub(super) batches: Vec<Batch>,
-    bytes: u64,
 }
 
 /// The place of a batch in the file, and of its rows in the source.
@@ -49,18 +48,15 @@ impl Lines {
 
 impl Spool {
     pub(super) fn new() -> io::Result<Self> {
-        Ok(Self { file: tempfile::tempfile()?, batches: Vec::new(), bytes: 0 })
+        Ok(Self { file: tempfile::tempfile()?, batches: Vec::new() })
     }
 
     pub(super) fn add(&mut self, rows: &RecordBatch, lines: Lines, beside: Option<Arc<str>>) -> Result<(), ArrowError> {
-        let mut bytes = Vec::new();
-        let mut writer = StreamWriter::try_new(&mut bytes, rows.schema_ref())?;
+        let offset = self.file.seek(SeekFrom::End(0))?;
+        let mut writer = StreamWriter::try_new_buffered(&self.file, rows.schema_ref())?;
         writer.write(rows)?;
-        writer.finish()?;
-        drop(writer);
-        self.file.write_all(&bytes)?;
-        self.batches.push(Batch { offset: self.bytes, lines, beside });
-        self.bytes += bytes.len() as u64;
+        writer.into_inner()?.flush()?;
+        self.batches.push(Batch { offset, lines, beside });
         Ok(())
     }
 

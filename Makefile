@@ -174,9 +174,11 @@ WHEEL =
 bench-gym:
 	scripts/bench/gym.sh $(WHEEL)
 
-## Memory and time of the import of 200,000 samples of Inspect, beside `inspect log dump`; SAMPLES says how many.
+## Memory and time of the import of 200,000 samples of Inspect, beside `inspect log dump`, and of 14 million steps in
+## Parquet, beside Polars; SAMPLES and STEPS say how many.
 bench-import:
 	scripts/bench/import.sh
+	scripts/bench/import_parquet.sh
 
 ## How soon `view` shows a list, an episode and its next frame in Chromium, beside Inspect View, in turns: benches/VIEW.md.
 bench-view:

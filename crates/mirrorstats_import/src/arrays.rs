@@ -9,7 +9,8 @@ use arrow::array::{
     Array, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array, LargeStringArray, ListArray, NullArray,
     RecordBatch, RecordBatchOptions, StringArray, StringViewArray, StructArray, UInt32Array,
 };
-use arrow::buffer::{NullBuffer, OffsetBuffer};
+use arrow::buffer::{BooleanBuffer, NullBuffer, OffsetBuffer};
+use arrow::compute::kernels::cmp::distinct;
 use arrow::compute::{CastOptions, cast, cast_with_options, take};
 use arrow::datatypes::{DataType, Field, Fields, Int32Type, Schema};
 use arrow::error::ArrowError;
@@ -72,6 +73,9 @@ fn unreadable(column: &ArrayRef, row: usize, error: &ArrowError) -> Unreadable {
 
 /// The decoder does not check that text with only a JSON annotation is UTF-8, nor the keys of dictionaries.
 fn utf8(column: &ArrayRef) -> Result<ArrayRef, Unreadable> {
+    if let Some(texts) = checked(column) {
+        return Ok(Arc::new(texts));
+    }
     let text = |row| {
         let bytes = bytes(column.as_ref(), row).transpose()?;
         Some(bytes.and_then(|bytes| std::str::from_utf8(bytes).map_err(|error| error.valid_up_to())).map_err(|valid| {
@@ -80,6 +84,16 @@ fn utf8(column: &ArrayRef) -> Result<ArrayRef, Unreadable> {
         }))
     };
     Ok(Arc::new((0..column.len()).map(|row| text(row).transpose()).collect::<Result<StringArray, _>>()?))
+}
+
+/// The same texts, checked all at once; `None` if one of them is not UTF-8, or for keys of a dictionary.
+fn checked(column: &ArrayRef) -> Option<StringArray> {
+    let (ends, data) = match column.data_type() {
+        DataType::Utf8 => (column.as_string::<i32>().offsets(), column.as_string::<i32>().values()),
+        DataType::Binary => (column.as_binary::<i32>().offsets(), column.as_binary::<i32>().values()),
+        _ => return None,
+    };
+    StringArray::try_new(ends.clone(), data.clone(), column.nulls().cloned()).ok()
 }
 
 fn bytes(texts: &dyn Array, row: usize) -> Result<Option<&[u8]>, usize> {
@@ -167,6 +181,22 @@ pub(super) fn array<'a>(values: impl IntoIterator<Item = Cell<'a>>) -> ArrayRef 
     let mut column = Builder::new(0);
     values.into_iter().enumerate().for_each(|(row, value)| column.push(row, value));
     array_of(&column.values, &column.kind)
+}
+
+/// True in each row whose value differs from that of the row before, and in the first one.
+pub(super) fn changes(values: &ArrayRef) -> BooleanBuffer {
+    let Some(others) = values.len().checked_sub(1) else { return BooleanBuffer::new_unset(0) };
+    match distinct(&values.slice(1, others), &values.slice(0, others)) {
+        Ok(changes) => [true].into_iter().chain(changes.values()).collect(),
+        // Lists and objects are not compared.
+        Err(_) => BooleanBuffer::new_set(values.len()),
+    }
+}
+
+/// A column with this value in every row.
+pub(super) fn repeated(value: Cell<'_>, rows: usize) -> ArrayRef {
+    let once = array([value]);
+    take(&once, &UInt32Array::from(vec![0; rows]), None).expect("the position of the only value is valid")
 }
 
 fn array_of(values: &[Cell<'_>], kind: &DataType) -> ArrayRef {

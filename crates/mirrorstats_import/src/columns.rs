@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use arrow::array::{Array as _, ArrayRef, RecordBatch};
 use indexmap::IndexMap;
 
-use super::arrays::{array, table};
+use super::arrays::{array, changes, repeated, table};
 use super::error::{Fault, Location};
 use super::mapping::Order;
 use super::value::Cell;
@@ -79,7 +79,7 @@ impl Columns {
         for (name, value) in folders {
             let value = value.as_ref().map_or(Cell::Null, |value| Cell::Spelled(value.into()));
             let Some(values) = rows.column_by_name(name) else {
-                added.push((name.clone(), array(vec![value; rows.num_rows()])));
+                added.push((name.clone(), repeated(value, rows.num_rows())));
                 continue;
             };
             let kind = limits.kind(name);
@@ -187,13 +187,11 @@ impl Columns {
         if declared.is_none() && inferred.is_of(values) {
             return Vec::new();
         }
-        let mut faults = Vec::new();
-        for row in 0..values.len() {
+        each_change(values, |row| {
             let value = Cell::at(values, row).typed(declared.map(|declared| declared.kind));
             let fault = declared.and_then(|declared| misdeclared(declared, &value));
-            faults.extend(fault.or_else(|| inferred.take(&value, &|| place(row))).map(|fault| (row, fault)));
-        }
-        faults
+            fault.or_else(|| inferred.take(&value, &|| place(row)))
+        })
     }
 }
 
@@ -255,8 +253,7 @@ fn attribution(text: Cell<'_>) -> Cell<'static> {
 
 /// Returns true if a value equals that of a folder's name, whose type may be unknown.
 fn is_same(value: &Cell<'_>, folder: &Cell<'_>) -> bool {
-    let kind = kind_of(value).ok().flatten();
-    value == folder || kind.is_some_and(|kind| folder.clone().typed(kind) == value.clone().typed(kind))
+    value == folder || value.kind().is_some_and(|kind| folder.clone().typed(kind) == value.clone().typed(kind))
 }
 
 fn integer(value: &Cell<'_>) -> Option<i64> {
@@ -277,17 +274,12 @@ fn named(kind: Kind) -> &'static str {
 
 fn kind_of(value: &Cell<'_>) -> Result<Option<Kind>, Box<Fault>> {
     match value {
-        Cell::Null => Ok(None),
-        Cell::Bool(_) => Ok(Some(Kind::Bool)),
-        Cell::Int(_) => Ok(Some(Kind::Int)),
-        Cell::Float(_) => Ok(Some(Kind::Float)),
-        Cell::Text(_) => Ok(Some(Kind::String)),
-        Cell::Spelled(text) => Ok(Some(spelling::kind_of(text))),
         Cell::Unheld(_) => Err(Box::new(Fault::new(spelling::held(), value.shown(), UNHELD))),
         Cell::List | Cell::Object => {
             let help = "give its parts keys of their own, write it as text, or leave it out";
             Err(Box::new(Fault::new("null, true or false, a number or a text", value.shown(), help)))
         }
+        value => Ok(value.kind()),
     }
 }
 
@@ -295,11 +287,22 @@ fn misfits(column: &Column, values: &ArrayRef, order: Order, limits: Limits<'_>)
     let Limits { expected, palette, .. } = limits;
     let rules = rules_of(column, Known { palette, experiments: expected.experiments });
     let is_ordered = column.name == "t" && order != Order::Numbers;
-    let fault = |row| {
+    each_change(values, |row| {
         let value = Cell::at(values, row).typed(column.stored.kind());
         if is_ordered && value.int().is_some() { None } else { misfit(column, &value, &rules) }
-    };
-    (0..values.len()).filter_map(|row| Some((row, fault(row)?))).collect()
+    })
+}
+
+/// The faults of all rows, given the check of a row. A value that repeats the one before is not checked again.
+fn each_change(values: &ArrayRef, mut fault: impl FnMut(usize) -> Option<Fault>) -> Vec<(usize, Fault)> {
+    let (mut faults, mut last) = (Vec::new(), None);
+    for (row, is_new) in changes(values).iter().enumerate() {
+        if is_new {
+            last = fault(row);
+        }
+        faults.extend(last.clone().map(|fault| (row, fault)));
+    }
+    faults
 }
 
 fn misfit(column: &Column, value: &Cell<'_>, rules: &[Rule<'_>]) -> Option<Fault> {

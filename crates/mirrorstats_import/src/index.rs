@@ -1,9 +1,9 @@
 //! The index of steps, and the check that episodes are complete: t = 1, 2, ... once each, with constant names.
 
-use std::collections::HashMap;
-
 use arrow::array::{ArrayRef, RecordBatch};
+use indexmap::IndexMap;
 
+use super::arrays::changes;
 use super::error::{Fault, Faults, Location};
 use super::mapping::Order;
 use super::text::Text;
@@ -11,19 +11,22 @@ use super::value::Cell;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_trace::schema::{COLUMNS, DeclaredColumn, Kind};
 
-/// A step by its place: the batch of a text, and the row in it.
+/// Steps of an episode by their place: rows one after the other in a batch of a text.
+///
+/// Most files have whole episodes in order, so that runs of steps take far less memory than steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct IndexedStep {
+pub(super) struct IndexedSteps {
     pub(super) episode: u32,
+    /// The number of the first step. The numbers of the others follow, or are the same if the rows alone have an order.
     t: i64,
     pub(super) text: u32,
     pub(super) batch: u32,
     pub(super) row: u32,
+    pub(super) rows: u32,
 }
 
 #[derive(Debug)]
 struct Head {
-    id: String,
     place: Location,
     constants: Vec<Cell<'static>>,
 }
@@ -31,9 +34,8 @@ struct Head {
 #[derive(Debug)]
 pub(super) struct Index {
     constants: Vec<(String, Kind)>,
-    heads: Vec<Head>,
-    by_id: HashMap<String, u32>,
-    steps: Vec<IndexedStep>,
+    heads: IndexMap<String, Head>,
+    steps: Vec<IndexedSteps>,
 }
 
 impl Index {
@@ -42,13 +44,13 @@ impl Index {
         let known = known.map(|column| (column.name.to_owned(), column.stored.kind()));
         let declared = declared.iter().filter(|column| column.constant);
         let declared = declared.map(|column| (column.name.clone(), column.kind));
-        Self { constants: known.chain(declared).collect(), heads: Vec::new(), by_id: HashMap::new(), steps: Vec::new() }
+        Self { constants: known.chain(declared).collect(), heads: IndexMap::new(), steps: Vec::new() }
     }
 
     /// Adds the rows of a batch without those that have a fault; returns the rows whose constants change.
     pub(super) fn add(
         &mut self,
-        (text, batch): (usize, usize),
+        (text, batch, order): (usize, usize, Order),
         rows: &RecordBatch,
         place: impl Fn(usize) -> Location,
         is_faulty: impl Fn(usize) -> bool,
@@ -57,44 +59,100 @@ impl Index {
             return Vec::new();
         };
         let constants: Vec<_> = self.constants.iter().map(|(name, kind)| (rows.column_by_name(name), *kind)).collect();
-        let mut faults = Vec::new();
-        for row in (0..rows.num_rows()).filter(|row| !is_faulty(*row)) {
-            let (Cell::Text(id), Cell::Int(t)) =
-                (Cell::at(ids, row).typed(Kind::String), Cell::at(ts, row).typed(Kind::Int))
-            else {
+        let compared = constants.iter().filter_map(|(column, _)| *column);
+        // Rows that repeat the one before belong to the same episode and have the same constants.
+        let is_new = compared.map(changes).fold(changes(ids), |one, other| &one | &other);
+        let (mut faults, mut verdict) = (Vec::new(), None);
+        let (mut current, mut is_due) = (None, false);
+        for row in 0..rows.num_rows() {
+            is_due |= is_new.value(row);
+            let Cell::Int(t) = Cell::at(ts, row).typed(Kind::Int) else { continue };
+            if is_faulty(row) {
                 continue;
-            };
-            let known = self.by_id.get(&*id).copied();
-            let episode = known.unwrap_or_else(|| {
-                let constants = constants.iter().map(|column| constant(*column, row).into_owned()).collect();
-                self.heads.push(Head { id: id.to_string(), place: place(row), constants });
-                let episode = narrow(self.heads.len() - 1);
-                self.by_id.insert(id.to_string(), episode);
-                episode
-            });
-            let [text, batch, at] = [text, batch, row].map(narrow);
-            self.steps.push(IndexedStep { episode, t, text, batch, row: at });
-            let head = &self.heads[episode as usize];
-            let changed =
-                self.constants.iter().zip(&constants).zip(&head.constants).find_map(|((name, column), first)| {
-                    let now = constant(*column, row);
-                    let expected = || format!("{}, as in the episode's first line ({})", first.shown(), head.place);
-                    let help = "correct the lines, or give the episodes ids of their own";
-                    (!now.is_same(first)).then(|| Fault::new(expected(), now.shown(), help).of_key(&name.0))
-                });
-            faults.extend(changed.map(|fault| (row, fault)));
+            }
+            if is_due {
+                current = self.episode(ids, &constants, row, &place);
+                verdict = current.and_then(|episode| self.changed(episode, &constants, row));
+                is_due = false;
+            }
+            let Some(episode) = current else { continue };
+            faults.extend(verdict.clone().map(|fault| (row, fault)));
+            let [text, batch, row] = [text, batch, row].map(narrow);
+            self.push(IndexedSteps { episode, t, text, batch, row, rows: 1 }, order);
         }
         faults
     }
 
+    /// The episode of a row; `None` if its id is no text.
+    fn episode(
+        &mut self,
+        ids: &ArrayRef,
+        constants: &[(Option<&ArrayRef>, Kind)],
+        row: usize,
+        place: &dyn Fn(usize) -> Location,
+    ) -> Option<u32> {
+        let Cell::Text(id) = Cell::at(ids, row).typed(Kind::String) else { return None };
+        let known = self.heads.get_index_of(&*id);
+        Some(narrow(known.unwrap_or_else(|| {
+            let constants = constants.iter().map(|column| constant(*column, row).into_owned()).collect();
+            self.heads.insert_full(id.into_owned(), Head { place: place(row), constants }).0
+        })))
+    }
+
+    /// The fault of the first constant that differs from that in the episode's first row.
+    fn changed(&self, episode: u32, constants: &[(Option<&ArrayRef>, Kind)], row: usize) -> Option<Fault> {
+        let head = &self.heads[episode as usize];
+        let mut compared = self.constants.iter().zip(constants).zip(&head.constants);
+        compared.find_map(|((name, column), first)| {
+            let now = constant(*column, row);
+            let expected = || format!("{}, as in the episode's first line ({})", first.shown(), head.place);
+            let help = "correct the lines, or give the episodes ids of their own";
+            (!now.is_same(first)).then(|| Fault::new(expected(), now.shown(), help).of_key(&name.0))
+        })
+    }
+
+    /// Adds a step to the run before, if it follows there.
+    fn push(&mut self, step: IndexedSteps, order: Order) {
+        if let Some(last) = self.steps.last_mut()
+            && (last.episode, last.text, last.batch) == (step.episode, step.text, step.batch)
+            && last.row + last.rows == step.row
+            && last.number(last.rows, order) == Some(step.t)
+        {
+            last.rows += 1;
+        } else {
+            self.steps.push(step);
+        }
+    }
+
     /// The steps of each episode in turn, in their order; adds a fault for each incomplete episode.
-    pub(super) fn into_steps(self, texts: &[Text], faults: &mut Faults) -> Vec<IndexedStep> {
+    pub(super) fn into_steps(self, texts: &[Text], faults: &mut Faults) -> Vec<IndexedSteps> {
         let Self { heads, mut steps, .. } = self;
         steps.sort_unstable();
         for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
-            faults.extend(sequence_fault(&heads[episode[0].episode as usize].id, episode, texts));
+            if !is_complete(episode, texts) {
+                let (id, _) = heads.get_index(episode[0].episode as usize).expect("each step is of a known episode");
+                faults.extend(sequence_fault(id, episode, texts));
+            }
         }
         steps
+    }
+}
+
+impl IndexedSteps {
+    /// The number of the step after this many others.
+    fn number(&self, after: u32, order: Order) -> Option<i64> {
+        if order == Order::Rows { Some(self.t) } else { self.t.checked_add(i64::from(after)) }
+    }
+
+    /// Each of the steps.
+    fn each(self, order: Order) -> impl Iterator<Item = Self> {
+        let step = move |after| Self {
+            t: self.number(after, order).unwrap_or(i64::MAX),
+            row: self.row + after,
+            rows: 1,
+            ..self
+        };
+        (0..self.rows).map(step)
     }
 }
 
@@ -106,13 +164,30 @@ fn constant((column, kind): (Option<&ArrayRef>, Kind), row: usize) -> Cell<'_> {
     column.map_or(Cell::Null, |column| Cell::at(column, row).typed(kind))
 }
 
-fn sequence_fault(id: &str, episode: &[IndexedStep], texts: &[Text]) -> Option<Fault> {
-    let text = |step: &IndexedStep| &texts[step.text as usize];
-    let place = |step: &IndexedStep| text(step).place(step.batch as usize, step.row as usize);
+fn order_of(text: &Text) -> Order {
+    text.read.as_ref().map_or(Order::Numbers, |read| read.order)
+}
+
+/// Returns true if the numbers run from 1 without a gap or a repetition, which is so in most files.
+fn is_complete(episode: &[IndexedSteps], texts: &[Text]) -> bool {
+    let order = |steps: &IndexedSteps| order_of(&texts[steps.text as usize]);
+    let mut next = Some(1);
+    episode.iter().all(|steps| {
+        let is_next = order(steps) == Order::Numbers && next == Some(steps.t);
+        next = steps.number(steps.rows, order(steps));
+        is_next
+    })
+}
+
+fn sequence_fault(id: &str, episode: &[IndexedSteps], texts: &[Text]) -> Option<Fault> {
+    let text = |step: &IndexedSteps| &texts[step.text as usize];
+    let place = |step: &IndexedSteps| text(step).place(step.batch as usize, step.row as usize);
     let of = format!("of episode `{}`", visible(id));
-    let order = text(episode.first()?).read.as_ref().map_or(Order::Numbers, |read| read.order);
-    let mut before: Option<&IndexedStep> = None;
-    for step in episode {
+    let order = order_of(text(episode.first()?));
+    let mut steps: Vec<_> = episode.iter().flat_map(|steps| steps.each(order_of(text(steps)))).collect();
+    steps.sort_unstable();
+    let mut before: Option<&IndexedSteps> = None;
+    for step in &steps {
         let wanted = before.map_or(1, |before| before.t.saturating_add(1));
         let is_again = before.is_some_and(|before| before.t == step.t);
         let is_right = match order {

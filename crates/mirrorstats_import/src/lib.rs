@@ -13,6 +13,7 @@
 //! `identification` and no key `self_color` get it from the text.
 
 mod arrays;
+mod beside;
 mod columns;
 mod error;
 mod format;
@@ -23,6 +24,7 @@ mod mapping;
 mod notes;
 mod rows;
 pub mod schema;
+mod source;
 mod spelling;
 mod spool;
 mod text;
@@ -53,6 +55,7 @@ use mirrorstats_trace::inputs::Input;
 use mirrorstats_trace::schema::colors::palette::Palette;
 use mirrorstats_trace::schema::{DeclaredColumn, Kind};
 use mirrorstats_trace::validate::{Expected, validate_as};
+use text::Steps;
 use write::write;
 
 /// Limits on the values of steps beyond the schema, and the trace's declarations about them.
@@ -83,7 +86,7 @@ impl Limits<'_> {
 
     fn recording(&self, texts: &[Text]) -> serde_json::Value {
         let steps = || texts.iter().filter_map(|text| text.read.as_ref());
-        let sources: Vec<&str> = steps().map(|steps| steps.sha256.as_str()).collect();
+        let sources: Vec<&str> = steps().flat_map(Steps::hashes).collect();
         let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
         let mut recording = json!({ "kind": origin.name(), "sources": sources });
         if let Some(domain) = self.domain {
@@ -133,7 +136,7 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     file.commit().map_err(|error| TraceError::write(out, error))?;
     Ok(Imported {
         episodes: steps.chunk_by(|a, b| a.episode == b.episode).count(),
-        steps: steps.len(),
+        steps: write::count(&steps),
         columns: columns.known().map(|column| column.name).collect(),
         own: columns.own(),
     })
@@ -164,7 +167,7 @@ fn survey(
         let (rows, mut found) = columns.completed(&text.batch(batch)?, &text.folders, limits);
         found.extend(columns.check(&rows, &place, (order, &absent), limits));
         let refused: HashSet<usize> = found.iter().map(|(row, _)| *row).collect();
-        found.extend(index.add((at, batch), &rows, place, |row| refused.contains(&row)));
+        found.extend(index.add((at, batch, order), &rows, place, |row| refused.contains(&row)));
         found.sort_by_key(|(row, _)| *row);
         faults.extend(found.into_iter().map(|(row, fault)| text.of_folder(fault).at(&place(row))));
     }
@@ -173,5 +176,6 @@ fn survey(
 
 fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {
     let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
-    Ok(validate_as(&[input], Expected { errors_alone: true, ..expected }, NonZeroUsize::MIN)?.errors()?)
+    let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    Ok(validate_as(&[input], Expected { errors_alone: true, ..expected }, threads)?.errors()?)
 }

@@ -3,23 +3,22 @@
 //! A mapping is data: a file of a user or one in `assets/import`, and `--map` and `--set` on top of it.
 
 use std::path::Path as FilePath;
-use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray, new_null_array};
+use arrow::array::{RecordBatch, new_null_array};
 use arrow::datatypes::DataType;
 use indexmap::IndexMap;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::arrays::{self, Node, Unreadable, array, plain};
+use super::arrays::{self, Unreadable, plain, repeated};
 use super::format::Format;
 use super::json::marked;
+use super::source::{Path, Pattern, Source};
 use super::value::Cell;
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::input;
 use mirrorstats_trace::inputs::Input;
-use mirrorstats_trace::schema::domain::is_general;
 use mirrorstats_trace::schema::{Kind, column};
 
 const LARGEST_FILE: Limit = Limit::new("bytes of a mapping file", 1 << 20);
@@ -29,6 +28,8 @@ pub struct Mapping {
     pub format: Option<Format>,
     /// The lists that hold the rows of an object, from the outside.
     pub(super) lists: Vec<List>,
+    /// The path of a file beside the log with the steps of a row.
+    pub(super) steps: Option<Pattern>,
     pub(super) settings: Settings,
     columns: IndexMap<String, Source>,
     /// True if an entry whose path is not in a table gives no column, instead of nulls.
@@ -48,6 +49,8 @@ struct MappingFile {
 pub(super) struct Settings {
     format: Option<String>,
     rows: String,
+    /// A pattern of the path from the folder of the file to JSON Lines with the steps of a row.
+    steps: Option<String>,
     /// A pattern of the ends of paths, such as `{model}/{level}/result.json`, whose parts are values of every row.
     pub(super) path: String,
     /// Values by which rows are left out.
@@ -65,44 +68,11 @@ pub(super) struct Settings {
 /// Values of a file for each of its rows, such as parts of its path.
 pub(super) type Given = IndexMap<String, String>;
 
-type Find<'a> = dyn Fn(&str) -> Option<ArrayRef> + 'a;
-
 /// A list of objects, and the name of its item in paths; without a name, the keys of the item alone.
 #[derive(Clone, Debug)]
 pub(super) struct List {
     pub(super) key: String,
     pub(super) item: String,
-}
-
-#[derive(Clone, Debug)]
-enum Source {
-    Constant(Value),
-    /// A text of several values: literal parts, each before a value, and the last literal.
-    Text(Vec<(String, Path)>, String),
-    Value(Path, Change),
-    /// The position within the episode, by an integer or by the order of rows.
-    Order(Option<Path>),
-}
-
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-struct Change {
-    from: Option<String>,
-    value: Option<Value>,
-    start: Option<i64>,
-    scale: Option<f64>,
-    /// True to take the nearest integer.
-    round: bool,
-    /// The unit of the scaled numbers, for readers of the file.
-    unit: Option<String>,
-    words: IndexMap<String, Value>,
-}
-
-/// The path to a value in a row: keys and positions separated by dots, and an integer to add to the value.
-#[derive(Clone, Debug)]
-struct Path {
-    keys: String,
-    added: i64,
 }
 
 /// How the steps of an episode are ordered.
@@ -142,7 +112,7 @@ impl Mapping {
         let mut mapping = file.map(Self::read).transpose()?.or(other).unwrap_or_default();
         for typed in columns {
             let (name, path) = pair(typed, "COLUMN=PATH")?;
-            mapping.columns.insert(name.clone(), Source::Value(Path::parse(&path), Change::default()));
+            mapping.columns.insert(name.clone(), Source::path(&path));
             mapping.settings.columns.insert(name, path.into());
         }
         for typed in constants {
@@ -187,6 +157,7 @@ impl Mapping {
         Ok(Self {
             format: settings.format.as_ref().map(known).transpose()?,
             lists: List::all(&settings.rows)?,
+            steps: settings.steps.as_deref().map(Pattern::parse).transpose()?,
             columns: settings.columns.iter().map(column).collect::<Result<_, _>>()?,
             settings,
             ..Self::default()
@@ -248,7 +219,7 @@ impl Mapping {
     pub(super) fn apply(&self, table: &RecordBatch, given: &Given) -> Result<RecordBatch, (String, Unreadable)> {
         let (rows, mut columns) = (table.num_rows(), Vec::new());
         let find = |key: &str| {
-            let given = || Some(array(vec![Cell::Spelled(given.get(key)?.into()); rows]));
+            let given = || Some(repeated(Cell::Spelled(given.get(key)?.into()), rows));
             table.column_by_name(key).cloned().or_else(given)
         };
         let is_constant = |source: &Source| matches!(source, Source::Constant(_));
@@ -268,7 +239,7 @@ impl Mapping {
         }
         for (name, source) in &self.columns {
             if let Source::Constant(value) = source {
-                columns.push((name.clone(), array(vec![Cell::of_json(value); rows])));
+                columns.push((name.clone(), repeated(Cell::of_json(value), rows)));
             }
         }
         let may_be_null = |name: &&String| column(name).is_some_and(|column| column.nullable);
@@ -304,158 +275,8 @@ impl List {
     }
 }
 
-impl Source {
-    fn of(entry: &Value) -> Result<Self, String> {
-        let change: Change = match entry {
-            Value::String(text) if text.contains('{') => return Self::text(text),
-            Value::String(path) => Change { from: Some(path.clone()), ..Change::default() },
-            Value::Object(_) => serde_json::from_value(entry.clone()).map_err(|error| error.to_string())?,
-            constant => return Ok(Self::Constant(constant.clone())),
-        };
-        match change {
-            Change { value: Some(value), from: None, .. } => Ok(Self::Constant(value)),
-            Change { from, start: Some(1), .. } => Ok(Self::Order(from.as_deref().map(Path::parse))),
-            Change { start: Some(_), .. } => Err("another `start` than 1, with which every trace begins,".to_owned()),
-            Change { from: Some(ref from), .. } => Ok(Self::Value(Path::parse(from), change)),
-            Change { .. } => Err("neither `from` nor `value`".to_owned()),
-        }
-    }
-
-    /// A text such as `{policy}/{task}`.
-    fn text(text: &str) -> Result<Self, String> {
-        let (mut parts, mut rest) = (Vec::new(), text);
-        while let Some((literal, after)) = rest.split_once('{') {
-            let (path, after) = after.split_once('}').ok_or("a `{` without `}`")?;
-            parts.push((literal.to_owned(), Path::parse(path)));
-            rest = after;
-        }
-        Ok(Self::Text(parts, rest.to_owned()))
-    }
-
-    fn paths(&self) -> impl Iterator<Item = &Path> {
-        let (one, several) = match self {
-            Self::Constant(_) | Self::Order(None) => (None, &[][..]),
-            Self::Value(path, _) | Self::Order(Some(path)) => (Some(path), &[][..]),
-            Self::Text(parts, _) => (None, parts.as_slice()),
-        };
-        one.into_iter().chain(several.iter().map(|(_, path)| path))
-    }
-
-    fn column(&self, name: &str, rows: usize, find: &Find<'_>) -> Result<Option<ArrayRef>, Unreadable> {
-        let cells = |path: &Path, change: &dyn Fn(Cell<'_>) -> Cell<'static>| {
-            let found = path.column(find)?;
-            Ok(found.map(|values| array((0..values.len()).map(|row| change(Cell::at(&values, row))))))
-        };
-        match self {
-            Self::Constant(_) => Ok(None),
-            Self::Order(None) => Ok(Some(Arc::new(Int64Array::from(vec![1; rows])))),
-            Self::Order(Some(path)) => cells(path, &|cell| path.finished(name, cell.typed(Kind::Int))),
-            Self::Value(path, change) if change.is_none() && path.added == 0 && !is_general_text(name) => {
-                path.column(find)
-            }
-            Self::Value(path, change) => cells(path, &|cell| path.finished(name, change.of(&cell))),
-            Self::Text(parts, end) => {
-                let columns = parts.iter().map(|(_, path)| path.column(find)).collect::<Result<Vec<_>, _>>()?;
-                let text = |row| {
-                    let value = |((literal, path), column): (&(String, Path), &Option<ArrayRef>)| {
-                        Some(format!("{literal}{}", path.added(Cell::at(column.as_ref()?, row)).text()?))
-                    };
-                    Some(parts.iter().zip(&columns).map(value).collect::<Option<String>>()? + end)
-                };
-                Ok(Some(Arc::new((0..rows).map(text).collect::<StringArray>())))
-            }
-        }
-    }
-}
-
-impl Change {
-    fn is_none(&self) -> bool {
-        self.scale.is_none() && !self.round && self.words.is_empty()
-    }
-
-    /// The value of a word, in another unit: an integer if dividing by the factor gives the number again, or if the mapping
-    /// rounds.
-    #[expect(clippy::float_cmp, reason = "that is the question")]
-    fn of<'a>(&'a self, cell: &Cell<'a>) -> Cell<'a> {
-        let word = cell.text().and_then(|text| self.words.get(&*text));
-        let cell = word.map_or_else(|| cell.clone(), Cell::of_json);
-        let number = cell.clone().typed(Kind::Float).float();
-        let Some((factor, number)) = self.scale.or(self.round.then_some(1.0)).zip(number) else { return cell };
-        let product = (number * factor).round();
-        if self.round || product / factor == number {
-            Cell::Float(product).typed(Kind::Int)
-        } else {
-            Cell::Float(number * factor)
-        }
-    }
-}
-
-impl Path {
-    fn parse(text: &str) -> Self {
-        match text.rsplit_once('+').map(|(keys, added)| (keys, added.parse())) {
-            Some((keys, Ok(added))) => Self { keys: keys.to_owned(), added },
-            _ => Self { keys: text.to_owned(), added: 0 },
-        }
-    }
-
-    fn column(&self, find: &Find<'_>) -> Result<Option<ArrayRef>, Unreadable> {
-        within(find, &self.keys).map(|values| plain(&values)).transpose()
-    }
-
-    /// The value with the number added. A number becomes text in columns that are text in every domain.
-    fn finished(&self, name: &str, found: Cell<'_>) -> Cell<'static> {
-        let value = self.added(found).into_owned();
-        match &value {
-            Cell::Unheld(_) | Cell::Int(_) | Cell::Float(_) if is_general_text(name) => {
-                Cell::Text(value.text().unwrap_or_default().into_owned().into())
-            }
-            _ => value,
-        }
-    }
-
-    fn added<'a>(&self, found: Cell<'a>) -> Cell<'a> {
-        match found.clone().typed(Kind::Int) {
-            Cell::Int(number) if self.added != 0 => {
-                let sum = i128::from(number) + i128::from(self.added);
-                i64::try_from(sum).map_or_else(|_| Cell::Unheld(sum.to_string().into()), Cell::Int)
-            }
-            _ => found,
-        }
-    }
-}
-
-fn is_general_text(name: &str) -> bool {
-    is_general(name) && column(name).is_some_and(|column| column.stored.kind() == Kind::String)
-}
-
 fn is_within(path: &str, key: &str) -> bool {
     path.strip_prefix(key).is_some_and(|rest| rest.starts_with(['.', '[']))
-}
-
-impl Node for &Value {
-    fn member(&self, key: &str) -> Option<Self> {
-        self.as_object()?.get(key)
-    }
-
-    fn item(&self, position: usize) -> Option<Self> {
-        self.as_array()?.get(position)
-    }
-}
-
-pub(super) fn at<N: Node>(node: N, path: &str) -> Option<N> {
-    if path.is_empty() {
-        return Some(node);
-    }
-    within(|key| node.member(key), path).or_else(|| {
-        let (position, rest) = path.split_once('.').unwrap_or((path, ""));
-        at(node.item(position.parse().ok()?)?, rest)
-    })
-}
-
-/// The value at a path that starts with the keys of `member`. Keys may contain dots.
-fn within<N: Node>(member: impl Fn(&str) -> Option<N>, path: &str) -> Option<N> {
-    let nested = || path.match_indices('.').find_map(|(dot, _)| at(member(&path[..dot])?, &path[dot + 1..]));
-    member(path).or_else(nested)
 }
 
 fn pair(typed: &str, expected: &'static str) -> Result<(String, String), MappingError> {

@@ -1,15 +1,19 @@
 //! The destination of what formats read: objects become columns, a mapping makes steps of them, and a temporary file
 //! keeps these until their types are known.
 
+use std::sync::Arc;
+
 use arrow::array::{Array as _, RecordBatch};
 use indexmap::IndexMap;
 use serde_json::Value;
 
 use super::arrays::{Builder, Unreadable, table};
+use super::beside::{Beside, StepFile};
 use super::columns::TEXT;
 use super::error::{Fault, Faults, ImportError};
-use super::mapping::{Given, Mapping, at};
+use super::mapping::{Given, Mapping};
 use super::notes::Notes;
+use super::source::at;
 use super::spool::{Lines, Spool};
 use super::value::Cell;
 use mirrorstats_exact::budget::{Budget, Exceeded, Limit};
@@ -23,6 +27,11 @@ const BATCH_ROWS: usize = 4096;
 
 /// A row with its whole reply; the longest reply of a model has some hundred thousand bytes.
 pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
+
+/// A file of steps is small, and its rows have the values of a row of the log too.
+const fn most_beside(bytes: u64) -> Limit {
+    Limit::in_proportion("bytes of rows in a file of its size beside a log", 64 << 20, 256, bytes)
+}
 
 const fn most_stored(bytes: u64) -> Limit {
     Limit::in_proportion("bytes of rows in a file of its size", 512 << 20, 256, bytes)
@@ -82,8 +91,13 @@ pub(super) struct Rows<'m> {
     pub(super) noun: &'static str,
     /// True to take lists and objects as values, which a step cannot have.
     pub(super) is_strict: bool,
+    pub(super) beside: Beside,
+    /// The file beside the log whose steps are read; the row of the log is then in the scope before the last.
+    steps_of: Option<Arc<str>>,
     spool: Spool,
+    /// The line of the last row.
     total: u64,
+    added: u64,
     columns: IndexMap<String, Builder>,
     /// The line of each row that is in memory.
     lines: Vec<u64>,
@@ -109,8 +123,11 @@ impl<'m> Rows<'m> {
             faults: Faults::default(),
             noun: "row",
             is_strict: false,
+            beside: Beside::default(),
+            steps_of: None,
             spool: Spool::new().map_err(ImportError::read(file))?,
             total: 0,
+            added: 0,
             columns: IndexMap::new(),
             lines: Vec::new(),
             bytes: 0,
@@ -118,14 +135,46 @@ impl<'m> Rows<'m> {
         })
     }
 
+    pub(super) const fn next_line(&self) -> u64 {
+        self.total + 1
+    }
+
     /// Adds the row in the last scope: its plain values, and what the mapping reads in all scopes.
     pub(super) fn add(&mut self, scopes: &[Scope<'_>]) -> Result<(), ImportError> {
-        self.add_line(scopes, self.total + 1)
+        self.add_line(scopes, self.next_line())
+    }
+
+    /// The file of the steps of the row in the last scope; `None` if the row has none, or if it is missing.
+    pub(super) fn steps_beside(&mut self, scopes: &[Scope<'_>], line: u64) -> Result<Option<StepFile>, ImportError> {
+        let Some(steps) = &self.mapping.steps else { return Ok(None) };
+        let Some(path) = steps.filled(steps.paths().map(|path| find(&path.keys, scopes))) else { return Ok(None) };
+        let row = format!("{}, {} {line}", self.file, self.noun);
+        self.beside.open(&path, &row)
+    }
+
+    /// Reads the rows of the file with the steps of a row, and returns their number.
+    pub(super) fn within(
+        &mut self,
+        name: &str,
+        bytes: u64,
+        line: u64,
+        read: impl FnOnce(&mut Self) -> Result<(), ImportError>,
+    ) -> Result<u64, ImportError> {
+        self.flush()?;
+        let before = self.added;
+        let noun = self.noun;
+        let log = std::mem::replace(&mut self.file, name.to_owned());
+        let budget = std::mem::replace(&mut self.budget, Budget::new(most_beside(bytes)));
+        (self.noun, self.steps_of) = ("line", Some(name.into()));
+        read(self)?;
+        self.flush()?;
+        (self.file, self.budget, self.steps_of) = (log, budget, None);
+        (self.noun, self.total) = (noun, line);
+        Ok(self.added - before)
     }
 
     pub(super) fn add_line(&mut self, scopes: &[Scope<'_>], line: u64) -> Result<(), ImportError> {
-        let (mapping, row) = (self.mapping, scopes.last().map(|scope| scope.value));
-        let members = row.and_then(Value::as_object).into_iter().flatten();
+        let mapping = self.mapping;
         let mut skipped = mapping.settings.skip.iter();
         let is_there = |(path, value): &(&String, &Value)| {
             if path.ends_with('#') {
@@ -138,13 +187,24 @@ impl<'m> Rows<'m> {
             self.notes.count(format!("rows whose `{path}` is {value}"), 1);
             return Ok(());
         }
-        let mut values = Vec::new();
+        let mut values: Vec<(String, Cell<'_>)> = Vec::new();
         let is_nested = |value: &Value| value.is_array() || value.is_object();
-        for (key, value) in members {
-            if !is_nested(value) || self.is_strict {
-                values.push((format!("{}{key}", mapping.settings.others), Cell::of_json(value)));
-            } else if !mapping.reads(key) {
-                self.notes.leave_out(key, 1);
+        let (of_row, of_step) = match &self.steps_of {
+            Some(_) => (scopes.iter().rev().nth(1), scopes.last()),
+            None => (scopes.last(), None),
+        };
+        for (scope, prefix) in
+            of_step.map(|scope| (scope, "")).into_iter().chain(of_row.map(|scope| (scope, &*mapping.settings.others)))
+        {
+            for (key, value) in scope.value.as_object().into_iter().flatten() {
+                let name = format!("{prefix}{key}");
+                if is_nested(value) && !self.is_strict {
+                    if !mapping.reads(key) {
+                        self.notes.leave_out(key, 1);
+                    }
+                } else if of_step.is_none() || !values.iter().any(|(known, _)| *known == name) {
+                    values.push((name, Cell::of_json(value)));
+                }
             }
         }
         let is_left_out =
@@ -182,6 +242,7 @@ impl<'m> Rows<'m> {
         }
         self.lines.push(line);
         self.total = line;
+        self.added += 1;
         self.bytes += work;
         Ok(())
     }
@@ -217,7 +278,7 @@ impl<'m> Rows<'m> {
             let line = Some(lines.at(row));
             Fault { file: self.file.clone(), line, noun: self.noun, ..Fault::new(expected, found, help).of_key(&name) }
         })?;
-        self.spool.add(&rows, lines).map_err(|error| self.failed(&error))
+        self.spool.add(&rows, lines, self.steps_of.clone()).map_err(|error| self.failed(&error))
     }
 
     fn failed(&self, error: &arrow::error::ArrowError) -> ImportError {
@@ -233,8 +294,10 @@ impl<'m> Rows<'m> {
         self.fault(part, &exceeded.expected(), "more", &Exceeded::help())
     }
 
-    pub(super) fn finish(mut self) -> Result<(Spool, Faults), ImportError> {
+    /// The stored rows, the faults, and the hash of the files beside the log.
+    pub(super) fn finish(mut self) -> Result<(Spool, Faults, Option<String>), ImportError> {
         self.flush()?;
-        Ok((self.spool, self.faults))
+        let beside = self.beside.finish(self.notes);
+        Ok((self.spool, self.faults, beside))
     }
 }

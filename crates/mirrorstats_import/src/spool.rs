@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufReader, Seek as _, SeekFrom, Write as _};
+use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::error::ArrowError;
@@ -12,7 +13,6 @@ use arrow::ipc::writer::StreamWriter;
 pub(super) struct Spool {
     file: File,
     pub(super) batches: Vec<Batch>,
-    bytes: u64,
 }
 
 /// The place of a batch in the file, and of its rows in the source.
@@ -20,6 +20,8 @@ pub(super) struct Spool {
 pub(super) struct Batch {
     offset: u64,
     pub(super) lines: Lines,
+    /// The file of the lines, if it is another one beside the source.
+    pub(super) beside: Option<Arc<str>>,
 }
 
 /// The line of each row, from 1; blank lines count.
@@ -46,18 +48,15 @@ impl Lines {
 
 impl Spool {
     pub(super) fn new() -> io::Result<Self> {
-        Ok(Self { file: tempfile::tempfile()?, batches: Vec::new(), bytes: 0 })
+        Ok(Self { file: tempfile::tempfile()?, batches: Vec::new() })
     }
 
-    pub(super) fn add(&mut self, rows: &RecordBatch, lines: Lines) -> Result<(), ArrowError> {
-        let mut bytes = Vec::new();
-        let mut writer = StreamWriter::try_new(&mut bytes, rows.schema_ref())?;
+    pub(super) fn add(&mut self, rows: &RecordBatch, lines: Lines, beside: Option<Arc<str>>) -> Result<(), ArrowError> {
+        let offset = self.file.seek(SeekFrom::End(0))?;
+        let mut writer = StreamWriter::try_new_buffered(&self.file, rows.schema_ref())?;
         writer.write(rows)?;
-        writer.finish()?;
-        drop(writer);
-        self.file.write_all(&bytes)?;
-        self.batches.push(Batch { offset: self.bytes, lines });
-        self.bytes += bytes.len() as u64;
+        writer.into_inner()?.flush()?;
+        self.batches.push(Batch { offset, lines, beside });
         Ok(())
     }
 

@@ -11,6 +11,7 @@ use arrow::array::RecordBatch;
 use arrow::error::ArrowError;
 use serde_json::Value;
 
+use super::beside::Beside;
 use super::error::{Fault, Faults, ImportError, Location};
 use super::format::lerobot;
 use super::format::{Format, HEAD};
@@ -40,7 +41,9 @@ pub struct Text {
 #[derive(Debug)]
 pub(super) struct Steps {
     /// The hash of the source.
-    pub(super) sha256: String,
+    sha256: String,
+    /// The hash of the files of steps beside the source.
+    beside: Option<String>,
     pub(super) noun: &'static str,
     pub(super) format: Format,
     /// The mapping for the footer; `None` for unmapped lines of steps.
@@ -129,7 +132,11 @@ impl Text {
         let file = self.file.try_clone().map_err(ImportError::read(&self.name))?;
         let bytes = file.metadata().map_err(ImportError::read(&self.name))?.len();
         let given = effective.parts_of_path(&self.path);
-        let read = |rows: &mut Rows<'_>| format.read(file, rows);
+        let folder = Path::new(&self.path).parent().map(Path::to_owned);
+        let read = |rows: &mut Rows<'_>| {
+            rows.beside = Beside::new(folder);
+            format.read(file, rows)
+        };
         self.read = Some(Steps::of((&self.name, bytes, sha256), (format, effective, mapping), given, notes, read)?);
         Ok(())
     }
@@ -214,8 +221,13 @@ impl Text {
     /// The place of a row of a batch.
     pub(super) fn place(&self, batch: usize, row: usize) -> Location {
         let read = self.read.as_ref();
-        let line = read.map_or(0, |read| read.spool.batches[batch].lines.at(row));
-        Location { file: Arc::clone(&self.name), noun: read.map_or("row", |read| read.noun), line }
+        let stored = read.map(|read| &read.spool.batches[batch]);
+        let line = stored.map_or(0, |batch| batch.lines.at(row));
+        let (file, noun) = match stored.and_then(|batch| batch.beside.as_ref()) {
+            Some(beside) => (beside, "line"),
+            None => (&self.name, read.map_or("row", |read| read.noun)),
+        };
+        Location { file: Arc::clone(file), noun, line }
     }
 }
 
@@ -233,9 +245,13 @@ impl Steps {
         read(&mut rows)?;
         let is_plain = rows.is_strict && asked.is_empty();
         let (noun, order, mapping) = (rows.noun, effective.order(), (!is_plain).then(|| asked.declared()));
-        let (spool, faults) = rows.finish()?;
+        let (spool, faults, beside) = rows.finish()?;
         let absent = effective.settings.absent.clone();
-        Ok(Self { sha256, noun, format, mapping, order, absent, spool, faults })
+        Ok(Self { sha256, beside, noun, format, mapping, order, absent, spool, faults })
+    }
+
+    pub(super) fn hashes(&self) -> impl Iterator<Item = &str> {
+        [self.sha256.as_str()].into_iter().chain(self.beside.as_deref())
     }
 }
 

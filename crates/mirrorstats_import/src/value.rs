@@ -78,6 +78,18 @@ impl<'a> Cell<'a> {
         }
     }
 
+    /// The type of the value; `None` if it is null, nested or a number that no type holds.
+    pub(super) fn kind(&self) -> Option<Kind> {
+        match self {
+            Self::Bool(_) => Some(Kind::Bool),
+            Self::Int(_) => Some(Kind::Int),
+            Self::Float(_) => Some(Kind::Float),
+            Self::Text(_) => Some(Kind::String),
+            Self::Spelled(text) => Some(spelling::kind_of(text)),
+            Self::Null | Self::Unheld(_) | Self::List | Self::Object => None,
+        }
+    }
+
     pub(super) fn into_owned(self) -> Cell<'static> {
         match self {
             Self::Null => Cell::Null,

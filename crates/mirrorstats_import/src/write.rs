@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::{panic, thread};
 
 use arrow::array::{Int32Array, RecordBatch, UInt32Array, new_null_array};
 use arrow::compute::{concat_batches, take_record_batch};
@@ -15,20 +17,20 @@ use super::Limits;
 use super::arrays::stored;
 use super::columns::Columns;
 use super::error::ImportError;
-use super::index::IndexedStep;
+use super::index::IndexedSteps;
 use super::mapping::Order;
 use super::text::Text;
 use mirrorstats_exact::replace::NewFile;
 use mirrorstats_identification::put_version;
 use mirrorstats_trace::error::TraceError;
 use mirrorstats_trace::schema::Kind;
-use mirrorstats_trace::write::row_groups::{RowGroups, field};
+use mirrorstats_trace::write::row_groups::{Filling, RowGroups, field};
 
 /// Writes the rows to a temporary file beside `out`.
 pub(super) fn write(
     texts: &[Text],
     columns: &mut Columns,
-    steps: &[IndexedStep],
+    steps: &[IndexedSteps],
     out: &Path,
     limits: Limits<'_>,
 ) -> Result<NewFile, ImportError> {
@@ -44,17 +46,25 @@ pub(super) fn write(
     let failed = |error: ParquetError| TraceError::write(out, error);
     let (fields, kinds): (Vec<_>, Vec<_>) = fields(columns, limits).unzip();
     let layout = Arc::new(Schema::new(fields));
-    let mut file = RowGroups::new(file, &layout, Some(&recording)).map_err(failed)?;
+    let file = RowGroups::new(file, &layout, Some(&recording)).map_err(failed)?;
     let mut gathering = Gathering { texts, columns, limits, layout, kinds, last: None };
-    let (mut start, mut end) = (0, 0);
-    for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
-        end += episode.len();
-        if file.is_due(end - start) || end == steps.len() {
-            file.write(&gathering.rows(&steps[start..end])?).map_err(failed)?;
-            start = end;
-        }
+    // Reading rows and compressing them take about as long.
+    let (sender, receiver) = mpsc::sync_channel(1);
+    let (gathered, written) = thread::scope(|scope| {
+        let writer = scope.spawn(move || written(file, receiver));
+        let gathered = gathering.send(steps, &sender);
+        drop(sender);
+        (gathered, writer.join().unwrap_or_else(|panic| panic::resume_unwind(panic)))
+    });
+    gathered?;
+    Ok(written.map_err(failed)?)
+}
+
+fn written(mut file: RowGroups<NewFile>, batches: Receiver<RecordBatch>) -> Result<NewFile, ParquetError> {
+    for rows in batches {
+        file.write(&rows)?;
     }
-    Ok(file.finish(None).map_err(failed)?)
+    file.finish(None)
 }
 
 /// The columns of the trace. A declared type holds whole numbers of a float column, and columns of nulls. A column of
@@ -68,6 +78,10 @@ fn fields(columns: &Columns, limits: Limits<'_>) -> impl Iterator<Item = (Field,
     known.chain(own)
 }
 
+pub(super) fn count(steps: &[IndexedSteps]) -> usize {
+    steps.iter().map(|steps| steps.rows as usize).sum()
+}
+
 struct Gathering<'a> {
     texts: &'a [Text],
     columns: &'a mut Columns,
@@ -78,22 +92,51 @@ struct Gathering<'a> {
 }
 
 impl Gathering<'_> {
-    /// The rows of these steps in their order. Each batch is read once, however scattered its rows are.
-    fn rows(&mut self, steps: &[IndexedStep]) -> Result<RecordBatch, ImportError> {
-        let mut by_batch: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
-        for (at, step) in steps.iter().enumerate() {
-            by_batch.entry((step.text, step.batch)).or_default().push(at);
-        }
-        let (mut parts, mut places) = (Vec::new(), vec![0; steps.len()]);
-        let mut gathered = 0;
-        for (batch, positions) in by_batch {
-            for at in &positions {
-                places[*at] = gathered;
-                gathered += 1;
+    /// Gives the rows of whole episodes to the writer, which may have failed.
+    fn send(&mut self, steps: &[IndexedSteps], writer: &SyncSender<RecordBatch>) -> Result<(), ImportError> {
+        let (mut start, mut end, mut rows) = (0, 0, 0);
+        let mut row_group = Filling::default();
+        for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
+            end += episode.len();
+            rows += count(episode);
+            if row_group.is_due(rows) || end == steps.len() {
+                if writer.send(self.rows(&steps[start..end])?).is_err() {
+                    return Ok(());
+                }
+                row_group.add(rows);
+                (start, rows) = (end, 0);
             }
-            let rows: UInt32Array = positions.iter().map(|at| Some(steps[*at].row)).collect();
+        }
+        Ok(())
+    }
+
+    /// The rows of these steps in their order. Each batch is read once, however scattered its rows are.
+    fn rows(&mut self, steps: &[IndexedSteps]) -> Result<RecordBatch, ImportError> {
+        let mut by_batch: BTreeMap<(u32, u32), Vec<(usize, IndexedSteps)>> = BTreeMap::new();
+        let mut at = 0;
+        for steps in steps {
+            by_batch.entry((steps.text, steps.batch)).or_default().push((at, *steps));
+            at += steps.rows as usize;
+        }
+        let (mut parts, mut places) = (Vec::new(), vec![0; at]);
+        let mut gathered = 0;
+        for (batch, runs) in by_batch {
+            for (at, run) in &runs {
+                for place in &mut places[*at..][..run.rows as usize] {
+                    *place = gathered;
+                    gathered += 1;
+                }
+            }
             let failed = self.texts[batch.0 as usize].failed();
-            parts.push(take_record_batch(self.batch(batch)?, &rows).map_err(failed)?);
+            let rows = self.batch(batch)?;
+            let is_slice = runs.windows(2).all(|pair| pair[0].1.row + pair[0].1.rows == pair[1].1.row);
+            parts.push(if is_slice {
+                let length = runs.iter().map(|(_, run)| run.rows as usize).sum();
+                rows.slice(runs[0].1.row as usize, length)
+            } else {
+                let rows_of_runs = runs.iter().flat_map(|(_, run)| run.row..run.row + run.rows);
+                take_record_batch(rows, &UInt32Array::from_iter_values(rows_of_runs)).map_err(failed)?
+            });
         }
         let failed = self.texts[steps[0].text as usize].failed();
         self.joined(&parts, places, steps).map_err(failed)
@@ -103,7 +146,7 @@ impl Gathering<'_> {
         &self,
         parts: &[RecordBatch],
         places: Vec<u32>,
-        steps: &[IndexedStep],
+        steps: &[IndexedSteps],
     ) -> Result<RecordBatch, ArrowError> {
         let mut rows = concat_batches(&self.layout, parts)?;
         if !places.is_sorted() {
@@ -113,7 +156,7 @@ impl Gathering<'_> {
         let t = self.layout.index_of("t")?;
         if self.texts.iter().any(is_ordered) {
             let mut columns = rows.columns().to_vec();
-            let numbers = steps.chunk_by(|a, b| a.episode == b.episode).flat_map(|episode| (1..).take(episode.len()));
+            let numbers = steps.chunk_by(|a, b| a.episode == b.episode).flat_map(|episode| (1..).take(count(episode)));
             columns[t] = Arc::new(numbers.collect::<Int32Array>());
             rows = RecordBatch::try_new(Arc::clone(&self.layout), columns)?;
         }

@@ -184,12 +184,22 @@ pub fn is_data_set(folder: &Path) -> bool {
 const LOGS: [&str; 4] = ["csv", "eval", "jsonl", "tsv"];
 const MAYBE_LOG: &str = "json";
 
-/// The logs in a folder without traces and below it; not the lists that mirrorstats writes beside traces.
+/// Folders of files that inspect-robots writes beside its logs: the steps of each trial, and its calls.
+const BESIDE_LOGS: [&str; 2] = ["actions", "wire"];
+
+/// The logs in a folder without traces and below it; not the lists that mirrorstats writes beside traces, nor the files
+/// that belong to a log beside them.
 fn logs_in(folder: &Path) -> Result<Vec<PathBuf>, TraceError> {
     let ends_in = |path: &Path, ending: &str| path.extension().is_some_and(|found| found == ending);
     let is_list = |path: &Path| ["lost.jsonl", "labels.jsonl"].iter().any(|name| path.ends_with(name));
     let files = files_below(folder)?;
-    let is_log = |path: &&PathBuf| LOGS.iter().any(|log| ends_in(path, log)) && !is_list(path);
+    let with_logs: BTreeSet<&Path> =
+        files.iter().filter(|path| ends_in(path, MAYBE_LOG)).map(|path| folder_of(path)).collect();
+    let is_beside = |path: &Path| {
+        let folders = path.ancestors().filter(|above| BESIDE_LOGS.iter().any(|name| above.ends_with(name)));
+        folders.map(folder_of).any(|above| with_logs.contains(above))
+    };
+    let is_log = |path: &&PathBuf| LOGS.iter().any(|log| ends_in(path, log)) && !is_list(path) && !is_beside(path);
     let logs: Vec<PathBuf> = files.iter().filter(is_log).cloned().collect();
     Ok(if logs.is_empty() { files.into_iter().filter(|path| ends_in(path, MAYBE_LOG)).collect() } else { logs })
 }

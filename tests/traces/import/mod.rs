@@ -1,5 +1,6 @@
 //! `mirrorstats import` at the process boundary: valid input becomes a trace, and nothing else does.
 
+mod beside;
 mod formats;
 mod guess;
 #[cfg(feature = "polars")]

@@ -12,6 +12,7 @@ use serde::Deserialize;
 use serde::de::{DeserializeOwned, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
+use crate::beside::StepFile;
 use crate::error::{Fault, ImportError, Location};
 use crate::json::{BYTE_ORDER_MARK, from_reader, marked};
 use crate::mapping;
@@ -21,8 +22,16 @@ use mirrorstats_exact::input;
 
 /// Adds the rows of each line. A bad line does not stop the search for others.
 pub(super) fn read_lines(reader: &mut BufReader<File>, rows: &mut Rows<'_>) -> Result<(), ImportError> {
-    let mut line = 0;
     (rows.noun, rows.is_strict) = ("line", rows.mapping.is_empty());
+    each_line(reader, rows, |rows, object, line| add(rows, object, line))
+}
+
+fn each_line(
+    reader: &mut BufReader<File>,
+    rows: &mut Rows<'_>,
+    mut add: impl FnMut(&mut Rows<'_>, &Value, u64) -> Result<(), ImportError>,
+) -> Result<(), ImportError> {
+    let mut line = 0;
     loop {
         let mut bytes = input::line(reader, LONGEST_LINE).map_err(ImportError::read(&rows.file))?;
         if bytes.is_empty() {
@@ -94,12 +103,7 @@ fn walk<'a>(
     scopes: &mut Vec<Scope<'a>>,
     line: Option<u64>,
 ) -> Result<(), ImportError> {
-    let Some((level, inner)) = levels.split_first() else {
-        return match line {
-            Some(line) => rows.add_line(scopes, line),
-            None => rows.add(scopes),
-        };
-    };
+    let Some((level, inner)) = levels.split_first() else { return add_row(rows, scopes, line) };
     let list = scopes.last().and_then(|scope| scope.find(&level.key)).and_then(Value::as_array);
     let items = list.map_or(&[][..], Vec::as_slice);
     if items.is_empty() {
@@ -111,6 +115,21 @@ fn walk<'a>(
         scopes.pop();
     }
     Ok(())
+}
+
+/// Adds the row in the last scope, or instead the steps in its own file, which have its values too.
+fn add_row(rows: &mut Rows<'_>, scopes: &[Scope<'_>], line: Option<u64>) -> Result<(), ImportError> {
+    let line = line.unwrap_or_else(|| rows.next_line());
+    let added = match rows.steps_beside(scopes, line)? {
+        None => 0,
+        Some(StepFile { name, file, bytes }) => rows.within(&name, bytes, line, |rows| {
+            each_line(&mut BufReader::new(file), rows, |rows, step, line| {
+                let scopes: Vec<_> = scopes.iter().copied().chain([Scope::new("", step)]).collect();
+                rows.add_line(&scopes, line)
+            })
+        })?,
+    };
+    if added == 0 { rows.add_line(scopes, line) } else { Ok(()) }
 }
 
 /// The keys and values of an object in their order, repeated ones included.

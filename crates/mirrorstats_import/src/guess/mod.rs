@@ -7,11 +7,13 @@ mod rows;
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use indexmap::IndexMap;
 use mirrorstats_exact::format::counted;
 use mirrorstats_trace::schema::domain::is_general;
 use mirrorstats_trace::schema::{Kind, column};
+use serde::Deserialize;
 
 use super::error::{Fault, ImportError};
 use super::format::Format;
@@ -37,75 +39,28 @@ const MOST_METRICS: usize = 12;
 /// Digits after the point of a float whose values have more than a metric can have.
 const ROUNDED: usize = 3;
 
-/// Names by which other programs call the columns that every trace has, the most certain first.
-const MODEL: [&str; 10] = [
-    "model",
-    "modelname",
-    "modelid",
-    "policy",
-    "policyname",
-    "agent",
-    "agentname",
-    "method",
-    "checkpoint",
-    "algorithm",
-];
-const EXPERIMENT: [&str; 12] = [
-    "experiment",
-    "task",
-    "taskname",
-    "taskid",
-    "env",
-    "envname",
-    "envid",
-    "environment",
-    "scenario",
-    "benchmark",
-    "suite",
-    "level",
-];
-const EPISODE: [&str; 10] = [
-    "episodeid",
-    "runid",
-    "trajectoryid",
-    "rolloutid",
-    "sampleid",
-    "trialid",
-    "uuid",
-    "episode",
-    "trajectory",
-    "rollout",
-];
-const SEED: [&str; 3] = ["seed", "taskseed", "envseed"];
-const RUN: [&str; 10] =
-    ["run", "trial", "episodeindex", "episodeidx", "episodeix", "repetition", "repeat", "attempt", "epoch", "episode"];
-const T: [&str; 8] = ["t", "step", "timestep", "stepindex", "stepidx", "frame", "frameindex", "turn"];
+/// The words of `assets/import/guess.toml`, which explains them.
+#[derive(Deserialize)]
+struct Words {
+    model: Vec<String>,
+    experiment: Vec<String>,
+    episode: Vec<String>,
+    seed: Vec<String>,
+    run: Vec<String>,
+    t: Vec<String>,
+    success: Vec<String>,
+    yes: Vec<String>,
+    no: Vec<String>,
+    lower: Vec<String>,
+    higher: Vec<String>,
+    summed: Vec<String>,
+    units: IndexMap<String, String>,
+}
 
-const SUCCESS: [&str; 10] =
-    ["success", "issuccess", "succeeded", "solved", "passed", "correct", "completed", "resolved", "result", "outcome"];
-const YES: [&str; 10] = ["yes", "y", "true", "pass", "passed", "success", "succeeded", "solved", "correct", "c"];
-const NO: [&str; 12] =
-    ["no", "n", "false", "fail", "failed", "failure", "unsolved", "incorrect", "i", "timeout", "error", "wrong"];
-const LOWER: [&str; 14] = [
-    "time",
-    "step",
-    "dist",
-    "error",
-    "collision",
-    "cost",
-    "force",
-    "intervention",
-    "token",
-    "latency",
-    "length",
-    "jerk",
-    "retr",
-    "loss",
-];
-const HIGHER: [&str; 5] = ["reward", "return", "score", "progress", "success"];
-/// Amounts per step, of which an episode has the sum.
-const SUMMED: [&str; 6] = ["reward", "cost", "token", "latency", "duration", "price"];
-const UNITS: [(&str, &str); 5] = [("_s", "s"), ("_ms", "ms"), ("_m", "m"), ("_usd", "USD"), ("_n", "N")];
+static WORDS: LazyLock<Words> = LazyLock::new(|| {
+    let text = include_str!("../../../../assets/import/guess.toml");
+    toml::from_str(text).expect("the tests draft with the words in `assets/import`")
+});
 
 /// Drafts how this file is read and scored. Errors: a file that cannot be read, or that has no rows.
 pub fn guess(path: &Path) -> Result<Draft, ImportError> {
@@ -155,6 +110,9 @@ struct Drafting {
     reasons: Vec<String>,
 }
 
+/// The path of the position of a row.
+const ROW: &str = "#";
+
 /// The columns that every trace has: entries of the mapping by their names.
 type Entries = IndexMap<String, String>;
 
@@ -190,55 +148,41 @@ impl Drafting {
         let is_integer = |values: &[Cell<'_>]| kind(values) == Some(Kind::Int) && !values.contains(&Cell::Null);
         let is_there = |values: &[Cell<'_>]| values.iter().all(|value| value.text().is_some());
         let rows = &self.rows;
-        let owned = |found: Option<&str>| found.map(str::to_owned);
-        let [model, experiment] = [&MODEL[..], &EXPERIMENT].map(|names| owned(rows.named(names, is_there)));
-        let [seed, run] = [&SEED[..], &RUN].map(|names| owned(rows.named(names, is_integer)));
-        let t = owned(rows.named(&T, is_integer));
-        let own_id = owned(rows.named(&EPISODE, is_there));
-        let parts: Vec<String> = [&model, &experiment, &seed, &run].into_iter().flatten().cloned().collect();
-        // An id of the file is enough if everything else is constant in its episodes.
-        let is_enough = |id: &String| {
-            let mut by_id: HashMap<String, Vec<String>> = HashMap::new();
-            let ids = rows.keys(std::slice::from_ref(id)).into_iter().map(|mut key| key.remove(0));
-            ids.zip(rows.keys(&parts)).all(|(id, others)| *by_id.entry(id).or_insert_with(|| others.clone()) == others)
-        };
-        let mut id: Vec<String> = match own_id {
-            Some(own) if is_enough(&own) => vec![own],
-            Some(own) if !parts.contains(&own) => [parts.clone(), vec![own]].concat(),
-            _ => parts.clone(),
-        };
-        if id.is_empty() {
-            id.push("#".to_owned());
-        }
-        let known: Vec<String> = id.iter().filter(|path| *path != "#").cloned().collect();
-        let episodes = rows.keys(&known).into_iter().collect::<HashSet<_>>().len();
-        let is_single = episodes == rows.count || known.is_empty();
-        let episodes = if known.is_empty() { rows.count } else { episodes };
-        let ordered = t.clone().filter(|t| {
-            let all: HashSet<Vec<String>> = rows.keys(&[known.clone(), vec![t.clone()]].concat()).into_iter().collect();
-            all.len() == rows.count
-        });
+        let found = [
+            ("model", rows.named(&WORDS.model, is_there)),
+            ("experiment", rows.named(&WORDS.experiment, is_there)),
+            ("seed", rows.named(&WORDS.seed, is_integer)),
+            ("run", rows.named(&WORDS.run, is_integer)),
+        ];
+        let parts: Vec<String> = found.iter().filter_map(|(_, path)| path.clone()).collect();
+        let id = self.id(&parts, rows.named(&WORDS.episode, is_there));
+        let known: Vec<String> = id.iter().filter(|path| *path != ROW).cloned().collect();
+        let distinct = |paths: &[String]| rows.keys(paths).into_iter().collect::<HashSet<_>>().len();
+        let episodes = if known.is_empty() { rows.count } else { distinct(&known) };
+        let is_single = episodes == rows.count;
+        let t = rows.named(&WORDS.t, is_integer);
+        let ordered = t.filter(|t| distinct(&[known.clone(), vec![t.clone()]].concat()) == rows.count);
 
         let mut entries = Entries::new();
-        let joined = |paths: &[String]| match paths {
-            [path] if path != "#" => quoted(path),
+        let own_id = match &*id {
+            [path] if path != ROW => quoted(path),
             paths => quoted(&paths.iter().map(|path| format!("{{{path}}}")).collect::<Vec<_>>().join("/")),
         };
-        entries.insert("episode_id".into(), joined(&id));
-        let constant = |value: &str| format!("{{ value = {} }}", quoted(value));
-        let or = |path: &Option<String>, other: String| path.as_deref().map_or(other, quoted);
-        entries.insert("model".into(), or(&model, constant(&self.stem)));
-        entries.insert("experiment".into(), or(&experiment, constant(&self.stem)));
-        entries.insert("seed".into(), or(&seed, "1".into()));
-        entries.insert("run".into(), or(&run, "1".into()));
-        let by_row = || if is_single { "1".to_owned() } else { "{ start = 1 }".to_owned() };
-        entries.insert(
-            "t".into(),
-            match &ordered {
-                Some(t) if !is_single => format!("{{ from = {}, start = 1 }}", quoted(t)),
-                _ => by_row(),
-            },
-        );
+        entries.insert("episode_id".into(), own_id);
+        for (name, path) in &found {
+            let is_text = matches!(*name, "model" | "experiment");
+            let constant = if is_text { format!("{{ value = {} }}", quoted(&self.stem)) } else { "1".to_owned() };
+            entries.insert((*name).into(), path.as_deref().map_or(constant, quoted));
+        }
+        let (number, reason) = match &ordered {
+            _ if is_single => ("1".to_owned(), "`t` is 1: each episode has one row".to_owned()),
+            Some(t) => (format!("{{ from = {}, start = 1 }}", quoted(t)), format!("`t` counts `{t}` from 1")),
+            None => {
+                let reason = "`t` is the order of the rows: no integer numbers the rows of an episode";
+                ("{ start = 1 }".to_owned(), reason.to_owned())
+            }
+        };
+        entries.insert("t".into(), number);
 
         let names = |paths: &[String]| paths.iter().map(|path| format!("`{path}`")).collect::<Vec<_>>().join(", ");
         let mut reasons = vec![format!(
@@ -247,22 +191,34 @@ impl Drafting {
             counted(episodes as u64, "episode"),
             if known.is_empty() { "row, for no column has the name of an id".to_owned() } else { names(&known) }
         )];
-        for (name, path) in [("model", &model), ("experiment", &experiment), ("seed", &seed), ("run", &run)] {
-            let found = |path: &String| {
-                let values: HashSet<_> = rows.keys(std::slice::from_ref(path)).into_iter().collect();
-                format!("`{name}` is `{path}`, with {}", counted(values.len() as u64, "value"))
-            };
-            let missing = || format!("`{name}` is the same in all rows: no column has such a name");
-            reasons.push(path.as_ref().map_or_else(missing, found));
-        }
-        reasons.push(match (&ordered, is_single) {
-            (_, true) => "`t` is 1: each episode has one row".to_owned(),
-            (Some(t), _) => format!("`t` counts `{t}` from 1"),
-            (None, _) => "`t` is the order of the rows: no integer numbers the rows of an episode".to_owned(),
-        });
+        reasons.extend(found.iter().map(|(name, path)| match path {
+            Some(path) => {
+                let values = distinct(std::slice::from_ref(path)) as u64;
+                format!("`{name}` is `{path}`, with {}", counted(values, "value"))
+            }
+            None => format!("`{name}` is the same in all rows: no column has such a name"),
+        }));
+        reasons.push(reason);
         self.reasons = reasons;
         let used = parts.into_iter().chain(id).chain(ordered).collect();
         (entries, used)
+    }
+
+    /// The paths whose values tell episodes apart, given those of identity and an id of the file.
+    fn id(&self, parts: &[String], own: Option<String>) -> Vec<String> {
+        // An id of the file is enough if everything else is constant in its episodes.
+        let is_enough = |own: &String| {
+            let mut by_id = HashMap::new();
+            let ids = self.rows.keys(std::slice::from_ref(own)).into_iter();
+            ids.zip(self.rows.keys(parts))
+                .all(|(id, others)| *by_id.entry(id).or_insert_with(|| others.clone()) == others)
+        };
+        match own {
+            Some(own) if is_enough(&own) => vec![own],
+            Some(own) if !parts.contains(&own) => [parts, &[own]].concat(),
+            _ if parts.is_empty() => vec![ROW.to_owned()],
+            _ => parts.to_vec(),
+        }
     }
 
     /// The other columns: entries where their names are no names of columns, and their metrics.
@@ -289,7 +245,7 @@ impl Drafting {
             while used.contains(&name.to_ascii_uppercase()) {
                 name.push_str("_2");
             }
-            let is_success = !has_success && [&last, &whole].iter().any(|name| SUCCESS.contains(&name.as_str()));
+            let is_success = !has_success && [&last, &whole].iter().any(|name| WORDS.success.contains(name));
             let words = words(values).filter(|_| is_success && found == Kind::String);
             if found == Kind::String && words.is_none() {
                 if path.contains('.') {
@@ -303,7 +259,7 @@ impl Drafting {
             }
             let kind = if words.is_some() { Kind::Bool } else { found };
             let decimals = (kind == Kind::Float).then(|| decimals(values));
-            let unit = UNITS.iter().find(|(ending, _)| name.to_ascii_lowercase().ends_with(ending));
+            let unit = WORDS.units.iter().find(|(ending, _)| name.to_ascii_lowercase().ends_with(*ending));
             let _ = write!(columns, "\n[column.{name}]\ntype = \"{}\"\n", type_of(kind));
             if let Some((digits, is_rounded)) = decimals {
                 let more = if is_rounded { " # its values have more; they are rounded" } else { "" };
@@ -314,10 +270,10 @@ impl Drafting {
             }
             has_success |= is_success;
             used.insert(name.to_ascii_uppercase());
-            let title = title(&name, unit.map(|(ending, _)| *ending));
+            let title = title(&name, unit.map(|(ending, _)| &**ending));
             let upper = name.to_ascii_uppercase();
-            let goes = |names: &[&str]| names.iter().any(|part| last.contains(part));
-            let better = if goes(&HIGHER) { Some("higher") } else { goes(&LOWER).then_some("lower") };
+            let goes = |parts: &[String]| parts.iter().any(|part| last.contains(part));
+            let better = if goes(&WORDS.higher) { Some("higher") } else { goes(&WORDS.lower).then_some("lower") };
             let is_zero_or_one =
                 || values.iter().all(|value| matches!(value.clone().typed(Kind::Int), Cell::Int(0 | 1) | Cell::Null));
             let (value, better) = match kind {
@@ -325,7 +281,7 @@ impl Drafting {
                 Kind::Bool => (format!("count({name})"), better),
                 _ if is_success && is_zero_or_one() => (format!("any({name} = 1)"), Some("higher")),
                 _ if is_single => (format!("at({name}, 1)"), better),
-                _ if goes(&SUMMED) => (format!("sum({name})"), better),
+                _ if goes(&WORDS.summed) => (format!("sum({name})"), better),
                 _ => (format!("at({name}, length())"), better),
             };
             let text = metric(&upper, &title, &value, better);
@@ -375,19 +331,10 @@ const fn type_of(kind: Kind) -> &'static str {
 /// The type that fits all values; `None` for lists, and if all are null.
 fn kind(values: &[Cell<'_>]) -> Option<Kind> {
     let kinds = values.iter().filter(|value| **value != Cell::Null).map(|value| match value {
-        Cell::Bool(_) => Some(Kind::Bool),
-        Cell::Int(_) => Some(Kind::Int),
-        Cell::Float(number) => Some(if spelling::whole(*number).is_some() { Kind::Int } else { Kind::Float }),
-        Cell::Spelled(text) => Some(spelling::kind_of(text)),
-        Cell::Text(_) => Some(Kind::String),
-        Cell::Unheld(_) | Cell::List | Cell::Object | Cell::Null => None,
+        Cell::Float(number) if spelling::whole(*number).is_some() => Some(Kind::Int),
+        value => value.kind(),
     });
-    let kinds = kinds.collect::<Option<Vec<Kind>>>()?;
-    kinds.into_iter().reduce(|before, now| match (before, now) {
-        (Kind::Int, Kind::Float) | (Kind::Float, Kind::Int) => Kind::Float,
-        (before, now) if before == now => now,
-        _ => Kind::String,
-    })
+    kinds.collect::<Option<Vec<Kind>>>()?.into_iter().reduce(spelling::joined)
 }
 
 /// The digits after the point of all values, and true if that is too many for a metric.
@@ -405,8 +352,8 @@ fn words(values: &[Cell<'_>]) -> Option<String> {
     let mut found: IndexMap<String, bool> = IndexMap::new();
     for text in values.iter().filter_map(Cell::text) {
         let small = text.to_ascii_lowercase();
-        let is_yes = YES.contains(&small.as_str());
-        if !is_yes && !NO.contains(&small.as_str()) {
+        let is_yes = WORDS.yes.contains(&small);
+        if !is_yes && !WORDS.no.contains(&small) {
             return None;
         }
         found.insert(text.into_owned(), is_yes);

@@ -39,7 +39,7 @@ impl Rows {
         let Some((list, inner)) = lists.split_first() else {
             return self.push(values);
         };
-        for item in crate::mapping::at(value, list).and_then(Value::as_array).into_iter().flatten() {
+        for item in crate::source::at(value, list).and_then(Value::as_array).into_iter().flatten() {
             self.add(item, inner, &values);
         }
     }
@@ -92,11 +92,10 @@ impl Rows {
     }
 
     /// The path with the first of these names that a fit column has.
-    pub(super) fn named(&self, names: &[&str], fits: impl Fn(&[Cell<'_>]) -> bool) -> Option<&str> {
-        let of_name = |name: &&str| {
-            self.columns.iter().find(|(path, values)| names_of(path).contains(&(*name).to_owned()) && fits(values))
-        };
-        names.iter().find_map(of_name).map(|(path, _)| path.as_str())
+    pub(super) fn named(&self, names: &[String], fits: impl Fn(&[Cell<'_>]) -> bool) -> Option<String> {
+        let of_name =
+            |name: &String| self.columns.iter().find(|(path, values)| names_of(path).contains(name) && fits(values));
+        names.iter().find_map(of_name).map(|(path, _)| path.clone())
     }
 
     /// The texts of these columns in each row.

@@ -18,7 +18,11 @@ use crate::diagnostic::{Code, Finding};
 use mirrorstats_parquet_pages::checksums::ChunkChecksums;
 use mirrorstats_parquet_pages::{Expansion, FaultSlot, Library, Store, text_type};
 
-const BATCH_ROWS: usize = 1024;
+/// Rows of a batch. Each batch has a cost of its own, which counts only where rows are narrow.
+const WIDE_BATCH: usize = 1024;
+const NARROW_BATCH: usize = 4096;
+/// The stored bytes of a row from which it is wide.
+const WIDE: u64 = 1024;
 
 pub type TableFile = File;
 
@@ -106,9 +110,12 @@ pub(crate) fn rows_of_part(
         .map_err(|error| damaged(name, &slot, &error))?;
     let fields: Fields = fields.fields().iter().map(with_keys).collect();
     let store = Store::new(file, Arc::new(Expansion::new(bytes)));
+    let stored: u64 = metadata.row_groups().iter().map(|group| group.total_byte_size().unsigned_abs()).sum();
+    let rows = metadata.file_metadata().num_rows().unsigned_abs().max(1);
+    let batch = if stored / rows < WIDE { NARROW_BATCH } else { WIDE_BATCH };
     let library = Library { store, metadata, checksums, row_groups, slot, writes_out: true };
     let mask = roots.map_or_else(ProjectionMask::all, |roots| ProjectionMask::roots(&schema, roots.iter().copied()));
-    CheckedRows::open(name, &library, mask, &fields, BATCH_ROWS, selection)
+    CheckedRows::open(name, &library, mask, &fields, batch, selection)
 }
 
 /// Texts inside of nested columns as keys into a dictionary: the pages of nested columns are not checked for texts that

@@ -25,7 +25,30 @@ const GATHERED_ROWS: usize = 8 * 1024;
 
 pub struct RowGroups<W: Write + Send> {
     parquet: ArrowWriter<Held<W>>,
+    filling: Filling,
+}
+
+/// The rows of the row group that is being filled.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Filling {
     rows: usize,
+}
+
+impl Filling {
+    /// Returns true if this many gathered rows are written at the end of an episode.
+    pub const fn is_due(self, gathered: usize) -> bool {
+        self.rows + gathered >= ROW_GROUP_ROWS || gathered >= GATHERED_ROWS
+    }
+
+    /// Adds written rows; returns true if the row group is then closed.
+    pub const fn add(&mut self, rows: usize) -> bool {
+        self.rows += rows;
+        let is_full = self.rows >= ROW_GROUP_ROWS;
+        if is_full {
+            self.rows = 0;
+        }
+        is_full
+    }
 }
 
 pub struct Gathered {
@@ -47,27 +70,20 @@ impl<W: Write + Send> RowGroups<W> {
         // Parquet's logical types are complete; an embedded Arrow schema would only pin one library's view.
         let options = ArrowWriterOptions::new().with_properties(properties(recording)).with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(Held::new(out), Arc::clone(layout), options)?;
-        Ok(Self { parquet, rows: 0 })
+        Ok(Self { parquet, filling: Filling::default() })
     }
 
     pub fn end_episode(&mut self, gathered: &mut Gathered) -> Result<()> {
-        if self.is_due(gathered.rows) { self.write(&gathered.take()?) } else { Ok(()) }
-    }
-
-    /// Returns true if this many gathered rows are written at the end of an episode.
-    pub const fn is_due(&self, gathered: usize) -> bool {
-        self.rows + gathered >= ROW_GROUP_ROWS || gathered >= GATHERED_ROWS
+        if self.filling.is_due(gathered.rows) { self.write(&gathered.take()?) } else { Ok(()) }
     }
 
     pub fn write(&mut self, rows: &RecordBatch) -> Result<()> {
         self.parquet.write(rows)?;
-        self.rows += rows.num_rows();
-        if self.rows >= ROW_GROUP_ROWS {
+        if self.filling.add(rows.num_rows()) {
             self.parquet.flush()?;
             self.parquet.sync()?;
             let closed = self.parquet.flushed_row_groups()[self.parquet.inner().row_groups()..].to_vec();
             self.parquet.inner_mut().pass_on(&closed)?;
-            self.rows = 0;
         }
         Ok(())
     }

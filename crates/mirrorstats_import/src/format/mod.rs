@@ -5,7 +5,7 @@
 mod csv;
 mod inspect;
 pub(super) mod lerobot;
-mod objects;
+pub(super) mod objects;
 mod parquet;
 
 use std::fs::File;

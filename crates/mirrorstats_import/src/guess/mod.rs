@@ -38,7 +38,7 @@ const MOST_METRICS: usize = 12;
 const ROUNDED: usize = 3;
 
 /// Names by which other programs call the columns that every trace has, the most certain first.
-const MODEL: [&str; 10] = [
+const MODEL: [&str; 13] = [
     "model",
     "modelname",
     "modelid",
@@ -49,6 +49,9 @@ const MODEL: [&str; 10] = [
     "method",
     "checkpoint",
     "algorithm",
+    "algo",
+    "system",
+    "robot",
 ];
 const EXPERIMENT: [&str; 12] = [
     "experiment",
@@ -82,7 +85,7 @@ const RUN: [&str; 10] =
 const T: [&str; 8] = ["t", "step", "timestep", "stepindex", "stepidx", "frame", "frameindex", "turn"];
 
 const SUCCESS: [&str; 10] =
-    ["success", "issuccess", "succeeded", "solved", "passed", "correct", "completed", "resolved", "result", "outcome"];
+    ["success", "succeeded", "solved", "passed", "correct", "exactmatch", "completed", "resolved", "result", "outcome"];
 const YES: [&str; 10] = ["yes", "y", "true", "pass", "passed", "success", "succeeded", "solved", "correct", "c"];
 const NO: [&str; 12] =
     ["no", "n", "false", "fail", "failed", "failure", "unsolved", "incorrect", "i", "timeout", "error", "wrong"];
@@ -118,6 +121,12 @@ pub fn guess(path: &Path) -> Result<Draft, ImportError> {
         text.read(&Mapping::default(), None, &mut Notes::default())?;
         Rows::of_tables(&text)?
     };
+    if let Some(path) = rows.only_lists() {
+        let expected = "rows: an object per episode or step, in a list or one per line".into();
+        let found = format!("an object of lists, such as `{path}`");
+        let help = "write one object, or one line of CSV, for each item of the lists".into();
+        return Err(Fault { expected, found, help, ..Fault::of_file(&text.name) }.into());
+    }
     if rows.count == 0 {
         let help = "name a file with rows, or write the mapping by hand: docs/how-to/domains.md";
         return Err(Fault {
@@ -191,10 +200,17 @@ impl Drafting {
         let is_there = |values: &[Cell<'_>]| values.iter().all(|value| value.text().is_some());
         let rows = &self.rows;
         let owned = |found: Option<&str>| found.map(str::to_owned);
-        let [model, experiment] = [&MODEL[..], &EXPERIMENT].map(|names| owned(rows.named(names, is_there)));
+        let [mut model, experiment] = [&MODEL[..], &EXPERIMENT].map(|names| owned(rows.named(names, is_there)));
         let [seed, run] = [&SEED[..], &RUN].map(|names| owned(rows.named(names, is_integer)));
         let t = owned(rows.named(&T, is_integer));
         let own_id = owned(rows.named(&EPISODE, is_there));
+        let mut is_only_told_apart = false;
+        if model.is_none() && own_id.is_none() && t.is_none() {
+            let others: Vec<String> = [&experiment, &seed, &run].into_iter().flatten().cloned().collect();
+            let is_text = |values: &[Cell<'_>]| kind(values) == Some(Kind::String) && is_there(values);
+            model = owned(rows.distinguishing(&others, is_text));
+            is_only_told_apart = model.is_some();
+        }
         let parts: Vec<String> = [&model, &experiment, &seed, &run].into_iter().flatten().cloned().collect();
         // An id of the file is enough if everything else is constant in its episodes.
         let is_enough = |id: &String| {
@@ -208,9 +224,9 @@ impl Drafting {
             _ => parts.clone(),
         };
         if id.is_empty() {
-            id.push("#".to_owned());
+            id = ["file#", "#"].map(str::to_owned).to_vec();
         }
-        let known: Vec<String> = id.iter().filter(|path| *path != "#").cloned().collect();
+        let known: Vec<String> = id.iter().filter(|path| !path.ends_with('#')).cloned().collect();
         let episodes = rows.keys(&known).into_iter().collect::<HashSet<_>>().len();
         let is_single = episodes == rows.count || known.is_empty();
         let episodes = if known.is_empty() { rows.count } else { episodes };
@@ -221,7 +237,7 @@ impl Drafting {
 
         let mut entries = Entries::new();
         let joined = |paths: &[String]| match paths {
-            [path] if path != "#" => quoted(path),
+            [path] => quoted(path),
             paths => quoted(&paths.iter().map(|path| format!("{{{path}}}")).collect::<Vec<_>>().join("/")),
         };
         entries.insert("episode_id".into(), joined(&id));
@@ -255,6 +271,11 @@ impl Drafting {
             let missing = || format!("`{name}` is the same in all rows: no column has such a name");
             reasons.push(path.as_ref().map_or_else(missing, found));
         }
+        if is_only_told_apart {
+            reasons.push(
+                "no column has the name of a model: this one tells apart rows that are otherwise one episode".into(),
+            );
+        }
         reasons.push(match (&ordered, is_single) {
             (_, true) => "`t` is 1: each episode has one row".to_owned(),
             (Some(t), _) => format!("`t` counts `{t}` from 1"),
@@ -286,10 +307,14 @@ impl Drafting {
             if entries.contains_key(&name) || column(&name).is_some_and(|column| is_general(column.name)) {
                 name = identifier(path);
             }
+            if entries.contains_key(&name) {
+                name.push_str("_of_row");
+            }
             while used.contains(&name.to_ascii_uppercase()) {
                 name.push_str("_2");
             }
-            let is_success = !has_success && [&last, &whole].iter().any(|name| SUCCESS.contains(&name.as_str()));
+            let is_named = |name: &String| SUCCESS.contains(&name.as_str()) || name.ends_with(SUCCESS[0]);
+            let is_success = !has_success && [&last, &whole].into_iter().any(is_named);
             let words = words(values).filter(|_| is_success && found == Kind::String);
             if found == Kind::String && words.is_none() {
                 if path.contains('.') {

@@ -174,7 +174,10 @@ fn a_column_that_tells_rows_apart_is_the_model() {
 #[test]
 fn a_table_that_lists_its_names_beside_its_rows_is_read() {
     let log = r#"{"columns": ["policy", "trial", "success"], "data": [["pi0", 0, true], ["pi0", 1, false], ["act", 0, true]]}"#;
-    draft_scores("wandb.table.json", log, "SUCCESS", &["1", "0", "1"]);
+    let indented = serde_json::to_string_pretty(&serde_json::from_str::<serde_json::Value>(log).unwrap()).unwrap();
+    for log in [log, &indented] {
+        draft_scores("wandb.table.json", log, "SUCCESS", &["1", "0", "1"]);
+    }
 }
 
 #[test]

@@ -88,6 +88,9 @@ pub(super) fn read_object(reader: BufReader<File>, rows: &mut Rows<'_>) -> Resul
         return Err(rows.fault("", about, format!("no list `{}`", list.key), help));
     }
     let mapping = rows.mapping;
+    if mapping.lists.is_empty() {
+        return add(rows, &object, 1);
+    }
     walk(rows, &mapping.lists, &mut vec![scope], None)
 }
 

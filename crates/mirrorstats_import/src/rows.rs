@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use arrow::array::{Array as _, RecordBatch};
+use arrow::array::{Array as _, ArrayRef, Int64Array, RecordBatch};
 use indexmap::IndexMap;
 use serde_json::Value;
 
@@ -24,6 +24,9 @@ const VALUE: u64 = 64;
 /// The most of rows in memory, with what their values take.
 const BATCH_BYTES: u64 = 8 << 20;
 const BATCH_ROWS: usize = 4096;
+
+/// The path of a row's position: in the innermost list, else in the file, from 0.
+const POSITION: &str = "#";
 
 /// A row with its whole reply; the longest reply of a model has some hundred thousand bytes.
 pub(super) const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
@@ -65,7 +68,7 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// The value at a path in these scopes, from the inside; `#` is the position in the innermost list.
+/// The value at a path in these scopes, from the inside; `#` is the position in the innermost list, if there is one.
 fn find<'a>(path: &str, scopes: &[Scope<'a>]) -> Cell<'a> {
     let number = |index: Option<usize>| index.and_then(|index| i64::try_from(index).ok()).map_or(Cell::Null, Cell::Int);
     let innermost = scopes.iter().rev().find_map(|scope| scope.index);
@@ -213,7 +216,10 @@ impl<'m> Rows<'m> {
             self.notes.leave_out(scope.name, 1);
         }
         let paths = mapping.paths().filter(|path| !self.given.contains_key(*path));
-        let found = paths.map(|path| (path.to_owned(), find(path, scopes)));
+        let in_file = i64::try_from(line).map_or(Cell::Null, |line| Cell::Int(line - 1));
+        let is_listed = scopes.iter().any(|scope| scope.index.is_some());
+        let at = |path: &str| if path == POSITION && !is_listed { in_file.clone() } else { find(path, scopes) };
+        let found = paths.map(|path| (path.to_owned(), at(path)));
         let found: Vec<_> = found.filter(|(path, _)| !values.iter().any(|(key, _)| key == path)).collect();
         values.extend(found);
         self.push(values, line)
@@ -261,14 +267,27 @@ impl<'m> Rows<'m> {
 
     /// Adds the rows of a table.
     pub(super) fn add_table(&mut self, table: &RecordBatch) -> Result<(), ImportError> {
+        let first = self.total + 1;
+        let table = &self.numbered(table);
         for (field, values) in table.schema_ref().fields().iter().zip(table.columns()) {
             if values.data_type().is_nested() && !self.mapping.reads(field.name()) {
                 self.notes.leave_out(field.name(), (values.len() - values.null_count()) as u64);
             }
         }
-        let first = self.total + 1;
         self.total += table.num_rows() as u64;
         self.store(table, Lines::From(first))
+    }
+
+    /// The table with the position of each row in its file, if the mapping reads it.
+    fn numbered(&self, rows: &RecordBatch) -> RecordBatch {
+        if !self.mapping.paths().any(|path| path == POSITION) || rows.column_by_name(POSITION).is_some() {
+            return rows.clone();
+        }
+        let positions = (self.total..).take(rows.num_rows()).map(|row| row.cast_signed());
+        let positions: ArrayRef = Arc::new(positions.collect::<Int64Array>());
+        let names = rows.schema_ref().fields().iter().map(|field| field.name().clone());
+        let columns = names.zip(rows.columns().iter().cloned()).chain([(POSITION.to_owned(), positions)]).collect();
+        table(columns, rows.num_rows())
     }
 
     fn store(&mut self, table: &RecordBatch, lines: Lines) -> Result<(), ImportError> {

@@ -14,6 +14,7 @@ use serde_json::Value;
 use super::beside::Beside;
 use super::error::{Fault, Faults, ImportError, Location};
 use super::format::lerobot;
+use super::format::objects::rows_of_table;
 use super::format::{Format, HEAD};
 use super::json::BYTE_ORDER_MARK;
 use super::mapping::{Given, Mapping, Order};
@@ -161,7 +162,9 @@ impl Text {
             ..Fault::of_file(&self.name)
         })?;
         let items = |value| if let Value::Array(items) = value { items } else { vec![value] };
-        Ok((None, Some(values.into_iter().flat_map(items).filter(Value::is_object).collect())))
+        let rows = |value| rows_of_table(&value).unwrap_or_else(|| vec![value]);
+        let values = values.into_iter().flat_map(items).filter(Value::is_object).flat_map(rows);
+        Ok((None, Some(values.collect())))
     }
 
     pub(super) fn batches(&self) -> usize {

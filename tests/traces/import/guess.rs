@@ -124,3 +124,82 @@ fn one_message_says_that_a_log_is_of_another_domain() {
     assert!(said.contains("this looks like another domain") && said.contains("import --guess"), "{said}");
     assert!(said.lines().count() < 12, "{said}");
 }
+
+/// The draft of a log scores it as it is, with these values of the first metric in the order of the rows.
+fn draft_scores(file: &str, log: &str, metric: &str, values: &[&str]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join(file), log).unwrap();
+    let (text, said) = draft(at, file);
+    let scores = run(at, &["score", file, "--definitions", "draft.toml", "--metrics", metric]).done();
+    let mut rows = csv::Reader::from_reader(scores.as_bytes());
+    let column = rows.headers().unwrap().iter().position(|name| name == metric).unwrap();
+    let mut found: Vec<String> = rows.records().map(|row| row.unwrap()[column].to_owned()).collect();
+    let mut values: Vec<String> = values.iter().map(|value| (*value).to_owned()).collect();
+    found.sort();
+    values.sort();
+    assert_eq!(found, values, "{file}: {text}");
+    said
+}
+
+#[test]
+fn rows_without_any_id_are_episodes() {
+    draft_scores("plain.csv", "reward,steps\n1.5,3\n2.5,4\n", "REWARD", &["1.5", "2.5"]);
+    let lines = "{\"doc_id\": 0, \"resps\": [[\"42\"]], \"exact_match\": 0.0}\n{\"doc_id\": 1, \"resps\": [[\"7\"]], \"exact_match\": 1.0}\n";
+    draft_scores("samples.jsonl", lines, "EXACT_MATCH", &["0", "1"]);
+}
+
+/// Stable-Baselines3's `Monitor`: settings before the header, and times under the name of our steps.
+#[test]
+fn settings_before_a_header_are_left_out_by_name() {
+    let log = "#{\"t_start\": 1700000000.1, \"env_id\": \"CartPole-v1\"}\nr,l,t\n9.25,10,0.5\n11.75,12,1.5\n";
+    draft_scores("monitor.csv", log, "R", &["9.25", "11.75"]);
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("monitor.csv"), log).unwrap();
+    draft(at, "monitor.csv");
+    let answer =
+        run(at, &["import", "monitor.csv", "--from", "draft.toml", "--definitions", "draft.toml", "-o", "m.parquet"]);
+    assert!(answer.stderr.contains("of settings before the header"), "{}", answer.stderr);
+    answer.done();
+}
+
+#[test]
+fn a_column_that_tells_rows_apart_is_the_model() {
+    let log = "arm,task,trial,success,note\nA,peg,1,yes,\nA,peg,2,no,\nB,peg,1,no,\nB,peg,2,no,\n";
+    let said = draft_scores("trials.csv", log, "SUCCESS", &["1", "0", "0", "0"]);
+    assert!(said.contains("`model` is `arm`, with 2 values") && said.contains("tells apart rows"), "{said}");
+}
+
+#[test]
+fn a_table_that_lists_its_names_beside_its_rows_is_read() {
+    let log = r#"{"columns": ["policy", "trial", "success"], "data": [["pi0", 0, true], ["pi0", 1, false], ["act", 0, true]]}"#;
+    let indented = serde_json::to_string_pretty(&serde_json::from_str::<serde_json::Value>(log).unwrap()).unwrap();
+    for log in [log, &indented] {
+        draft_scores("wandb.table.json", log, "SUCCESS", &["1", "0", "1"]);
+    }
+}
+
+#[test]
+fn a_folder_with_a_file_per_episode_is_drafted_by_its_first_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("results")).unwrap();
+    for (number, success) in [(1, 1.0), (2, 0.0)] {
+        let log = format!("{{\n  \"task_success\": {success:.1},\n  \"num_steps\": {number}\n}}\n");
+        fs::write(at.join(format!("results/episode_{number}_res.json")), log).unwrap();
+    }
+    let (_, said) = draft(at, "results");
+    assert!(said.contains("episode_1_res.json, the first of 2 files"), "{said}");
+    let table = run(at, &["report", "results", "--definitions", "draft.toml", "--no-figures", "--out", "o"]).done();
+    assert!(table.contains("1/2"), "{table}");
+}
+
+#[test]
+fn an_object_of_lists_is_refused_with_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("stats.json"), r#"{"lift": {"Return": [0.5, 1.0], "Horizon": [9, 12]}}"#).unwrap();
+    let error = run(at, &["import", "--guess", "stats.json"]).refused();
+    assert!(error.contains("an object of lists, such as `lift.Return`"), "{error}");
+}

@@ -98,7 +98,11 @@ impl TemporaryFolder {
     pub(super) fn with_mode(parent: &Path, prefix: &OsStr, mode: u32) -> io::Result<Self> {
         let (path, lock) = make(parent, prefix, |path| {
             make_folder(path, mode)?;
-            Ok(File::open(path).ok())
+            match File::open(path) {
+                // Another process took it for a leftover; the next name is tried.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => Err(io::ErrorKind::AlreadyExists.into()),
+                opened => Ok(opened.ok()),
+            }
         })?;
         Ok(Self { path, _lock: lock })
     }

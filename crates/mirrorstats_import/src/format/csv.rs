@@ -1,11 +1,12 @@
 //! CSV: the header names the columns; cells are separated by commas, or by tabs if the header has no comma.
 
 use std::fs::File;
-use std::io::{BufReader, Seek as _};
+use std::io::{self, BufReader, Seek as _, SeekFrom};
 use std::sync::Arc;
 
 use ::csv::{Error, ReaderBuilder, StringRecord};
 use arrow::array::{ArrayRef, LargeStringBuilder};
+use serde_json::{Map, Value};
 
 use crate::arrays::table;
 use crate::error::ImportError;
@@ -18,8 +19,10 @@ const BATCH_ROWS: usize = 4096;
 const BATCH_BYTES: usize = 4 << 20;
 
 pub(super) fn read(mut reader: BufReader<File>, rows: &mut Rows<'_>) -> Result<(), ImportError> {
-    let header = input::line(&mut reader, LONGEST_HEADER).map_err(ImportError::read(&rows.file))?;
-    reader.rewind().map_err(ImportError::read(&rows.file))?;
+    let (header, lines) = header_of(&mut reader).map_err(ImportError::read(&rows.file))?;
+    if lines > 0 {
+        rows.notes.count("lines of settings before the header".to_owned(), lines);
+    }
     let is_tabbed = header.contains(&b'\t') && !header.contains(&b',');
     let mut reader = ReaderBuilder::new().delimiter(if is_tabbed { b'\t' } else { b',' }).from_reader(reader);
     let names = reader.headers().map_err(|error| unreadable(rows, &error))?.clone();
@@ -48,6 +51,21 @@ pub(super) fn read(mut reader: BufReader<File>, rows: &mut Rows<'_>) -> Result<(
         let columns = columns.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef);
         let columns = names.iter().map(str::to_owned).zip(columns).collect();
         rows.add_table(&table(columns, count))?;
+    }
+}
+
+/// The header and the number of lines before it; the file is then at the header. Stable-Baselines3's `Monitor` writes its
+/// settings there, as `#` and a JSON object.
+fn header_of(reader: &mut BufReader<File>) -> io::Result<(Vec<u8>, u64)> {
+    let (mut lines, mut start) = (0, 0);
+    loop {
+        let line = input::line(reader, LONGEST_HEADER)?;
+        let settings = line.strip_prefix(b"#").map(serde_json::from_slice::<Map<String, Value>>);
+        if !matches!(settings, Some(Ok(_))) {
+            reader.seek(SeekFrom::Start(start))?;
+            return Ok((line, lines));
+        }
+        (lines, start) = (lines + 1, start + line.len() as u64);
     }
 }
 

@@ -5,7 +5,7 @@
 mod csv;
 mod inspect;
 pub(super) mod lerobot;
-mod objects;
+pub(super) mod objects;
 mod parquet;
 
 use std::fs::File;
@@ -123,10 +123,14 @@ impl Format {
         file.rewind().map_err(ImportError::read(&rows.file))?;
         let mut reader = BufReader::new(file);
         let head = reader.fill_buf().map_err(ImportError::read(&rows.file))?;
-        let is_list = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head).trim_ascii_start().starts_with(b"[");
+        let text = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head).trim_ascii_start();
+        let is_list = text.starts_with(b"[");
+        // Indented JSON has its first brace in a line of its own.
+        let is_indented = text.split(|byte| *byte == b'\n').next().is_some_and(|line| line.trim_ascii() == b"{");
         let is_parquet = head.starts_with(b"PAR1");
         match self {
             Self::JsonLines | Self::Json if is_list => objects::read_list(reader, rows),
+            Self::JsonLines if is_indented => objects::read_object(reader, rows),
             Self::JsonLines => objects::read_lines(&mut reader, rows),
             Self::Csv => csv::read(reader, rows),
             Self::Parquet => parquet::read(reader.into_inner(), rows),

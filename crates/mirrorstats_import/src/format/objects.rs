@@ -88,12 +88,32 @@ pub(super) fn read_object(reader: BufReader<File>, rows: &mut Rows<'_>) -> Resul
         return Err(rows.fault("", about, format!("no list `{}`", list.key), help));
     }
     let mapping = rows.mapping;
+    if mapping.lists.is_empty() {
+        return add(rows, &object, 1);
+    }
     walk(rows, &mapping.lists, &mut vec![scope], None)
 }
 
 fn add(rows: &mut Rows<'_>, object: &Value, line: u64) -> Result<(), ImportError> {
     let mapping = rows.mapping;
+    if let Some(items) = rows_of_table(object).filter(|_| mapping.lists.is_empty() && !rows.is_strict) {
+        let mut items = items.iter().enumerate();
+        return items.try_for_each(|(index, value)| rows.add(&[Scope { name: "", value, index: Some(index) }]));
+    }
     walk(rows, &mapping.lists, &mut vec![Scope::new("", object)], Some(line))
+}
+
+/// The rows of a table that lists its columns' names beside rows without names, as Weights & Biases and pandas
+/// (`orient="split"`) write it; `None` for any other object.
+pub(crate) fn rows_of_table(object: &Value) -> Option<Vec<Value>> {
+    let names = object.get("columns")?.as_array()?.iter().map(Value::as_str).collect::<Option<Vec<_>>>()?;
+    let is_new = |(at, name): (usize, &&str)| !names[..at].contains(name);
+    let rows = object.get("data")?.as_array()?.iter().map(Value::as_array).collect::<Option<Vec<_>>>()?;
+    if !names.iter().enumerate().all(is_new) || rows.iter().any(|row| row.len() != names.len()) {
+        return None;
+    }
+    let named = |row: &Vec<Value>| names.iter().map(|name| (*name).to_owned()).zip(row.iter().cloned()).collect();
+    Some(rows.into_iter().map(|row| Value::Object(named(row))).collect())
 }
 
 /// Adds a row for each item of the innermost list. Items have the line of their object, or else are counted.

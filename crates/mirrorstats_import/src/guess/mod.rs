@@ -73,6 +73,12 @@ pub fn guess(path: &Path) -> Result<Draft, ImportError> {
         text.read(&Mapping::default(), None, &mut Notes::default())?;
         Rows::of_tables(&text)?
     };
+    if let Some(path) = rows.only_lists() {
+        let expected = "rows: an object per episode or step, in a list or one per line".into();
+        let found = format!("an object of lists, such as `{path}`");
+        let help = "write one object, or one line of CSV, for each item of the lists".into();
+        return Err(Fault { expected, found, help, ..Fault::of_file(&text.name) }.into());
+    }
     if rows.count == 0 {
         let help = "name a file with rows, or write the mapping by hand: docs/how-to/domains.md";
         return Err(Fault {
@@ -110,8 +116,8 @@ struct Drafting {
     reasons: Vec<String>,
 }
 
-/// The path of the position of a row.
-const ROW: &str = "#";
+/// The paths of a file's hash and of the position of a row in the file: an id where no column is one.
+const ROW_OF_FILE: [&str; 2] = ["file#", "#"];
 
 /// The columns that every trace has: entries of the mapping by their names.
 type Entries = IndexMap<String, String>;
@@ -148,24 +154,30 @@ impl Drafting {
         let is_integer = |values: &[Cell<'_>]| kind(values) == Some(Kind::Int) && !values.contains(&Cell::Null);
         let is_there = |values: &[Cell<'_>]| values.iter().all(|value| value.text().is_some());
         let rows = &self.rows;
-        let found = [
+        let mut found = [
             ("model", rows.named(&WORDS.model, is_there)),
             ("experiment", rows.named(&WORDS.experiment, is_there)),
             ("seed", rows.named(&WORDS.seed, is_integer)),
             ("run", rows.named(&WORDS.run, is_integer)),
         ];
+        let (own_id, t) = (rows.named(&WORDS.episode, is_there), rows.named(&WORDS.t, is_integer));
+        let is_open = found[0].1.is_none() && own_id.is_none() && t.is_none();
+        if is_open {
+            let others: Vec<String> = found.iter().filter_map(|(_, path)| path.clone()).collect();
+            let is_text = |values: &[Cell<'_>]| kind(values) == Some(Kind::String) && is_there(values);
+            found[0].1 = rows.distinguishing(&others, is_text).map(str::to_owned);
+        }
         let parts: Vec<String> = found.iter().filter_map(|(_, path)| path.clone()).collect();
-        let id = self.id(&parts, rows.named(&WORDS.episode, is_there));
-        let known: Vec<String> = id.iter().filter(|path| *path != ROW).cloned().collect();
+        let id = self.id(&parts, own_id);
+        let known: Vec<String> = id.iter().filter(|path| !ROW_OF_FILE.contains(&path.as_str())).cloned().collect();
         let distinct = |paths: &[String]| rows.keys(paths).into_iter().collect::<HashSet<_>>().len();
         let episodes = if known.is_empty() { rows.count } else { distinct(&known) };
         let is_single = episodes == rows.count;
-        let t = rows.named(&WORDS.t, is_integer);
         let ordered = t.filter(|t| distinct(&[known.clone(), vec![t.clone()]].concat()) == rows.count);
 
         let mut entries = Entries::new();
         let own_id = match &*id {
-            [path] if path != ROW => quoted(path),
+            [path] => quoted(path),
             paths => quoted(&paths.iter().map(|path| format!("{{{path}}}")).collect::<Vec<_>>().join("/")),
         };
         entries.insert("episode_id".into(), own_id);
@@ -198,6 +210,10 @@ impl Drafting {
             }
             None => format!("`{name}` is the same in all rows: no column has such a name"),
         }));
+        if is_open && found[0].1.is_some() {
+            let reason = "no column has the name of a model: this one tells apart rows that are otherwise one episode";
+            reasons.push(reason.to_owned());
+        }
         reasons.push(reason);
         self.reasons = reasons;
         let used = parts.into_iter().chain(id).chain(ordered).collect();
@@ -216,7 +232,7 @@ impl Drafting {
         match own {
             Some(own) if is_enough(&own) => vec![own],
             Some(own) if !parts.contains(&own) => [parts, &[own]].concat(),
-            _ if parts.is_empty() => vec![ROW.to_owned()],
+            _ if parts.is_empty() => ROW_OF_FILE.map(str::to_owned).to_vec(),
             _ => parts.to_vec(),
         }
     }
@@ -242,10 +258,14 @@ impl Drafting {
             if entries.contains_key(&name) || column(&name).is_some_and(|column| is_general(column.name)) {
                 name = identifier(path);
             }
+            if entries.contains_key(&name) {
+                name.push_str("_of_row");
+            }
             while used.contains(&name.to_ascii_uppercase()) {
                 name.push_str("_2");
             }
-            let is_success = !has_success && [&last, &whole].iter().any(|name| WORDS.success.contains(name));
+            let is_named = |name: &String| WORDS.success.contains(name) || name.ends_with(&WORDS.success[0]);
+            let is_success = !has_success && [&last, &whole].into_iter().any(is_named);
             let words = words(values).filter(|_| is_success && found == Kind::String);
             if found == Kind::String && words.is_none() {
                 if path.contains('.') {

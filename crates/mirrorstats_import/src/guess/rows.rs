@@ -1,5 +1,7 @@
 //! The rows of a file of any shape, as columns of values by their paths.
 
+use std::collections::HashSet;
+
 use arrow::array::{Array, ArrayRef, AsArray as _};
 use indexmap::IndexMap;
 use serde_json::Value;
@@ -96,6 +98,22 @@ impl Rows {
         let of_name =
             |name: &String| self.columns.iter().find(|(path, values)| names_of(path).contains(name) && fits(values));
         names.iter().find_map(of_name).map(|(path, _)| path.clone())
+    }
+
+    /// The fit column with which the values of these columns are different in each row; `None` if they are so already.
+    pub(super) fn distinguishing(&self, paths: &[String], fits: impl Fn(&[Cell<'_>]) -> bool) -> Option<&str> {
+        let is_unique = |paths: &[String]| self.keys(paths).into_iter().collect::<HashSet<_>>().len() == self.count;
+        if paths.is_empty() || is_unique(paths) {
+            return None;
+        }
+        let mut others = self.columns.iter().filter(|(path, values)| !paths.contains(path) && fits(values));
+        others.find(|(path, _)| is_unique(&[paths, &[(*path).clone()]].concat())).map(|(path, _)| path.as_str())
+    }
+
+    /// The first column, if all values of all columns are lists.
+    pub(super) fn only_lists(&self) -> Option<&str> {
+        let is_list = |values: &Vec<Cell<'_>>| values.iter().all(|value| *value == Cell::List);
+        self.columns.keys().next().filter(|_| self.columns.values().all(is_list)).map(String::as_str)
     }
 
     /// The texts of these columns in each row.

@@ -9,7 +9,7 @@ use mirrorstats_import::{Draft, Format, Mapping, Notes, Text, guess};
 use mirrorstats_study::Study;
 use mirrorstats_study::import::{ImportRequest, import, mapping_in};
 use mirrorstats_study::report::{ReportOptions, report};
-use mirrorstats_trace::inputs::Input;
+use mirrorstats_trace::inputs::{Input, resolve};
 
 /// Make a trace of another harness's steps or logs
 ///
@@ -81,12 +81,16 @@ impl ImportArgs {
     }
 
     fn draft(&self) -> Result<Outcome, Failure> {
-        let [file] = &*self.steps else {
-            let words = format!("--guess: expected one file, found {}\n  help: name one of them", self.steps.len());
+        let [place] = &*self.steps else {
+            let words = format!("--guess: expected one file or folder, found {}\n  help: name one", self.steps.len());
             return Err(Failure::input(words));
         };
-        let Draft { text, reasons } = guess(file).map_err(Failure::input)?;
-        let table = first_table(file, &text)?;
+        let files = resolve(&[place.clone().into_os_string()], io::empty())?;
+        let Draft { text, mut reasons } = guess(&files[0].path).map_err(Failure::input)?;
+        if files.len() > 1 {
+            reasons.insert(0, format!("the draft is of {}, the first of {} files", files[0].name, files.len()));
+        }
+        let table = first_table(files, &text)?;
         output::notes(&reasons);
         output::plain(table.lines().fold(text, |text, line| format!("{text}\n# {line}").trim_end().to_owned()) + "\n")
     }
@@ -101,12 +105,12 @@ impl ImportArgs {
     }
 }
 
-/// What `report` prints for the file under the draft.
-fn first_table(file: &Path, draft: &str) -> Result<String, Failure> {
+/// What `report` prints for the files under the draft.
+fn first_table(files: Vec<Input>, draft: &str) -> Result<String, Failure> {
     let folder = TemporaryFolder::private("draft").map_err(Failure::input)?;
     let definitions = folder.path().join("draft.toml");
     std::fs::write(&definitions, draft).map_err(Failure::input)?;
-    let study = Study::with_logs(vec![Input::new(file)], Some(&definitions))?.definitions(&definitions)?;
+    let study = Study::with_logs(files, Some(&definitions))?.definitions(&definitions)?;
     let report = report(&study, &ReportOptions { figures: false, ..ReportOptions::default() })?;
     let tables = report.main_table().into_iter().chain(report.other_table());
     Ok(tables.map(|table| table.printed().markdown()).collect())

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::bind::{self, Binding, BoundMetric};
+use super::bind::{self, Binding};
 use super::catalogs::catalog::{Better, Catalog, Control, DecimalColumn, Experiment, Kind, Metric, by_order, is_share};
 use super::catalogs::measure;
 use super::columns::{ColumnOrigin, Columns, KnownColumn, Level, Type};
@@ -150,22 +150,10 @@ impl Definitions {
         if let Ok(binding) = &binding {
             faults.extend(level_faults(&document, binding));
             faults.extend(duration_faults(&document, binding));
-            faults.extend(measure::faults(&document, |metric| binding.metrics[metric].kind));
+            faults.extend(measure::faults(&document, binding));
         }
         let Some(binding) = binding.ok().filter(|_| faults.is_empty()) else { return Err(Faults(faults).in_order()) };
-        let catalog = catalog(&document, &binding);
-        let mut plan = binding.plan;
-        let output = |(name, bound): (String, BoundMetric)| Output {
-            name,
-            kind: bound.kind,
-            decimals: bound.decimals,
-            node: bound.node,
-        };
-        let outputs = binding.metrics.into_iter().map(output);
-        plan.outputs = outputs.collect();
-        plan.lets = binding.lets;
-        plan.filter = binding.filter;
-        Ok(Self { catalog, plan, document })
+        Ok(Self { catalog: catalog(&document, &binding), plan: binding.plan, document })
     }
 }
 
@@ -256,7 +244,7 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
 
 /// A duration counts steps: its methods count the episodes that still run at each of them.
 fn duration_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
-    let is_decimal = |name: &String| binding.metrics.get(name).is_some_and(|bound| bound.decimals > 0);
+    let is_decimal = |name: &String| binding.output(name).is_some_and(|output| output.decimals > 0);
     let durations = document.metrics.iter().filter(|(name, entry)| entry.said.finished.is_some() && is_decimal(name));
     let fault = |(name, entry): (&String, &file::MetricEntry)| {
         Fault::new(entry.finished.clone(), format!("the duration `{name}` has decimals; expected a number of steps"))
@@ -273,7 +261,7 @@ fn level_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
     });
     let mut faults = Vec::new();
     for (name, level, place) in of_metrics.chain(of_experiments) {
-        let is_rate = binding.metrics.get(name).is_some_and(|bound| bound.kind == Kind::Rate);
+        let is_rate = binding.output(name).is_some_and(|output| output.kind == Kind::Rate);
         if is_rate && !is_share(level) {
             let message = format!("the chance level of the rate `{name}` is {level}; expected a fraction from 0 to 1");
             faults.push(Fault::new(place.clone(), message));
@@ -316,10 +304,9 @@ fn decimal_columns(document: &Document) -> IndexMap<String, DecimalColumn> {
 }
 
 fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
-    let metric = |(name, entry): (&String, &file::MetricEntry)| {
-        let bound = &binding.metrics[name];
-        let (kind, decimals) = (bound.kind, bound.decimals);
-        let default_unit = || match (&bound.unit, kind) {
+    let metric = |((name, entry), output): ((&String, &file::MetricEntry), &Output)| {
+        let (kind, decimals) = (output.kind, output.decimals);
+        let default_unit = || match (&binding.units[name], kind) {
             (Some(unit), Kind::Quantity) => unit.clone(),
             _ if decimals > 0 => String::new(),
             _ => kind.default_unit().to_owned(),
@@ -344,7 +331,7 @@ fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
         };
         (name.clone(), metric)
     };
-    document.metrics.iter().map(metric).collect()
+    document.metrics.iter().zip(&binding.plan.outputs).map(metric).collect()
 }
 
 fn experiments(document: &Document) -> IndexMap<String, Experiment> {

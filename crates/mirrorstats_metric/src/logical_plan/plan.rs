@@ -214,6 +214,18 @@ impl Plan {
         (0..self.nodes.len()).filter(|&at| needed[at]).map(NodeId).collect()
     }
 
+    /// The comparison of `t` with a moment of the episode that a condition is, if it is one.
+    pub fn window(&self, condition: &Op) -> Option<(Comparison, NodeId)> {
+        match condition {
+            Op::Compare(comparison, left, right) if self.node(*left).op == Op::Time => match &self.node(*right).op {
+                Op::Spread(moment) => Some((*comparison, *moment)),
+                Op::Constant(_) => Some((*comparison, *right)),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
     pub fn columns(&self, nodes: &[NodeId]) -> Vec<(&str, Level)> {
         let column = |id: &NodeId| match &self.node(*id).op {
             Op::Column(name) => Some((name.as_str(), self.node(*id).level)),
@@ -303,6 +315,10 @@ impl Builder {
 
     pub(crate) fn node(&self, id: NodeId) -> &Node {
         self.plan.node(id)
+    }
+
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
     }
 
     pub(crate) fn finish(self) -> Plan {

@@ -162,20 +162,10 @@ impl Rewriter<'_> {
             match self.op(part) {
                 _ if self.is_local(part) => own = self.both(own, part, Level::Step),
                 Op::And(x, y) => open.extend([*y, *x]),
-                _ => windows.push(self.window(part)?),
+                op => windows.push(self.builder.plan().window(op)?),
             }
         }
         (!windows.is_empty()).then_some(Windowed { condition: own, windows })
-    }
-
-    fn window(&self, condition: NodeId) -> Option<(Comparison, NodeId)> {
-        match self.op(condition) {
-            Op::Compare(comparison, x, y) => match (self.op(*x), self.op(*y)) {
-                (Op::Time, Op::Spread(moment)) => Some((*comparison, *moment)),
-                _ => None,
-            },
-            _ => None,
-        }
     }
 
     fn search(&mut self, aggregate: Aggregate, x: NodeId, ty: Type, windowed: Windowed) -> NodeId {

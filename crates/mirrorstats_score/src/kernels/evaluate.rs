@@ -132,8 +132,8 @@ impl Evaluation<'_> {
     fn kernel(&self, id: StepId, kernel: &Kernel, step: &Step) -> Result<Vector, ArrowError> {
         let segments = self.batch.segments;
         Ok(match kernel {
+            Kernel::Op(Op::Spread(x)) if self.plan.step(*x).shape == Shape::One => self.repeat(*x, step),
             Kernel::Op(op) => self.operation(id, op, step.ty)?,
-            Kernel::Repeat(x) => self.repeat(*x, step),
             Kernel::Symbols(keys) => self.of(*keys).keyed().symbols().into(),
             Kernel::CompareTexts(comparison, x, y) => {
                 let ranks = self.symbols.ranks();

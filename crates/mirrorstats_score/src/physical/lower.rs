@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::window::{beside_its_episode, computes_after_lookup, is_leaf, split, window};
+use super::window::{beside_its_episode, computes_after_lookup, is_leaf, split};
 use super::{Kernel, PhysicalPlan, Shape, StepId};
 use mirrorstats_metric::columns::{Level, Type};
 use mirrorstats_metric::logical_plan::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan};
@@ -106,7 +106,7 @@ impl<'a> Lowering<'a> {
     fn full(&mut self, id: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
         let step = self.plain(id, at);
         let (ty, from) = (self.physical.step(step).ty, self.physical.step(step).shape);
-        if from == Shape::One { self.physical.push(Kernel::Repeat(step), ty, shape) } else { step }
+        if from == Shape::One { self.physical.push(Kernel::Op(Op::Spread(step)), ty, shape) } else { step }
     }
 
     fn gives_keys(&self, step: StepId) -> bool {
@@ -116,18 +116,14 @@ impl<'a> Lowering<'a> {
 
     fn spread(&mut self, x: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
         let values = self.plain(x, at);
-        let ty = self.physical.step(values).ty;
-        match self.physical.step(values).shape {
-            Shape::One => self.physical.push(Kernel::Repeat(values), ty, shape),
-            from if from == shape => values,
-            _ => self.physical.push(Kernel::Op(Op::Spread(values)), ty, shape),
-        }
+        let (ty, from) = (self.physical.step(values).ty, self.physical.step(values).shape);
+        if from == shape { values } else { self.physical.push(Kernel::Op(Op::Spread(values)), ty, shape) }
     }
 
     fn compare(&mut self, op: &Op, comparison: Comparison, (x, y): (NodeId, NodeId), at: Option<StepId>) -> Kernel {
         let plan = self.plan;
         if at.is_none() {
-            if let Some((comparison, moment)) = window(plan, op) {
+            if let Some((comparison, moment)) = plan.window(op) {
                 return Kernel::Window(comparison, self.full(moment, Shape::Episodes, None));
             }
             if let Some((column, text)) = beside_its_episode(plan, op) {
@@ -170,7 +166,7 @@ impl<'a> Lowering<'a> {
             self.full(id, shape, at)
         } else {
             let null = self.physical.push(Kernel::Op(Op::Constant(Constant::Null)), ty, Shape::One);
-            self.physical.push(Kernel::Repeat(null), ty, shape)
+            self.physical.push(Kernel::Op(Op::Spread(null)), ty, shape)
         };
         Kernel::Op(Op::Case { branches, otherwise: Some(otherwise) })
     }

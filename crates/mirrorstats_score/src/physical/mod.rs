@@ -42,8 +42,6 @@ pub enum Kernel {
     /// and `At` take keys too. `Compare` of symbols is for equality only. No operand of `And`, `Or`, a division,
     /// `Coalesce` and `Lag` is a constant, nor is a condition or the last value of `Case`, which always has one.
     Op(Op<StepId>),
-    /// A constant repeated at each episode or timestep.
-    Repeat(StepId),
     /// The symbols of keys.
     Symbols(StepId),
     /// A comparison of symbols by the order of their texts.
@@ -65,7 +63,7 @@ impl Kernel {
     pub fn operands(&self) -> Vec<StepId> {
         match self {
             Self::Op(op) => op.operands(),
-            Self::Repeat(x) | Self::Symbols(x) | Self::Window(_, x) => vec![*x],
+            Self::Symbols(x) | Self::Window(_, x) => vec![*x],
             Self::CompareTexts(_, x, y)
             | Self::KeysEqual { keys: x, text: y, .. }
             | Self::NullWhereAbsent { values: x, moments: y } => vec![*x, *y],

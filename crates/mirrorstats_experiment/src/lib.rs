@@ -243,10 +243,11 @@ mod tests {
         for experiment in all.filter(|experiment| experiment.hand.is_none()) {
             let definitions = experiment.definitions.as_deref().filter(|name| *name != "paper").unwrap_or("battery");
             let document = mirrorstats_metric::file::read(definitions).unwrap();
-            let defined = &document.experiments[experiment.name()];
-            assert_eq!((defined.title.as_str(), defined.order), (experiment.title.as_str(), experiment.order));
+            let entry = &document.experiments[experiment.name()];
+            let defined = &entry.experiment;
+            assert_eq!((defined.title.as_str(), entry.order), (experiment.title.as_str(), experiment.order));
             let levels = |metric: &str| {
-                let level = defined.chance.get(metric).map(|(level, _)| level);
+                let level = defined.chance.get(metric);
                 level.map(|level| level.as_ref().map_or_else(|| "none".to_owned(), ToString::to_string))
             };
             assert_eq!(levels("TSA"), experiment.chance.get("TSA").map(ToString::to_string), "{}", experiment.name());

@@ -132,18 +132,6 @@ impl Columns {
             known.decimals = decimals;
         }
     }
-
-    /// Removes a column: these traces use its name for something else.
-    pub fn forget(&mut self, name: &str) {
-        self.known.shift_remove(name);
-    }
-
-    /// Sets for each column with a fallback whether some trace has it.
-    pub fn set_read(&mut self, is_read: impl Fn(&str) -> bool) {
-        for (name, known) in &mut self.known {
-            known.fallback.iter_mut().for_each(|fallback| fallback.is_read = is_read(name));
-        }
-    }
 }
 
 impl<N: Into<String>> FromIterator<(N, KnownColumn)> for Columns {

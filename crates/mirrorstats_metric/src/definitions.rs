@@ -4,15 +4,13 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::bind::{self, Binding, BoundMetric};
-use super::catalogs::catalog::{Better, Catalog, Control, DecimalColumn, Experiment, Kind, Metric, by_order};
+use super::bind::{self, Binding};
+use super::catalogs::catalog::{Better, Catalog, Control, DecimalColumn, Experiment, Kind, Metric, by_order, is_share};
 use super::catalogs::measure;
 use super::columns::{ColumnOrigin, Columns, KnownColumn, Level, Type};
 use super::file::{self, ColumnEntry, Document, FileError};
 use super::logical_plan::plan::{NodeId, Output, Plan};
-use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::hash;
-use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_exact::suggest::did_you_mean;
 use mirrorstats_toml_spec::{Fault, Faults, Source, Written};
 
@@ -152,22 +150,10 @@ impl Definitions {
         if let Ok(binding) = &binding {
             faults.extend(level_faults(&document, binding));
             faults.extend(duration_faults(&document, binding));
-            faults.extend(measure::faults(&document, |metric| binding.metrics[metric].kind));
+            faults.extend(measure::faults(&document, binding));
         }
         let Some(binding) = binding.ok().filter(|_| faults.is_empty()) else { return Err(Faults(faults).in_order()) };
-        let catalog = catalog(&document, &binding);
-        let mut plan = binding.plan;
-        let output = |(name, bound): (String, BoundMetric)| Output {
-            name,
-            kind: bound.kind,
-            decimals: bound.decimals,
-            node: bound.node,
-        };
-        let outputs = binding.metrics.into_iter().map(output);
-        plan.outputs = outputs.collect();
-        plan.lets = binding.lets;
-        plan.filter = binding.filter;
-        Ok(Self { catalog, plan, document })
+        Ok(Self { catalog: catalog(&document, &binding), plan: binding.plan, document })
     }
 }
 
@@ -237,12 +223,12 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
 fn experiment_faults(document: &Document) -> Vec<Fault> {
     let mut faults = Vec::new();
     for (own, entry) in &document.experiments {
-        let chance = entry.chance.iter().map(|(name, (_, place))| (name, place));
-        let reference = entry.reference.iter().map(|(name, (_, place))| (name, place));
-        let compared = entry.control.iter().flat_map(|(control, _, places)| control.on.iter().zip(places));
-        let named = chance.chain(reference).chain(compared);
+        let levels = entry.levels.iter().map(|((_, name), place)| (name, place));
+        let control = entry.experiment.control.as_ref().zip(entry.control.as_ref());
+        let compared = control.iter().flat_map(|(control, (_, places))| control.on.iter().zip(places));
+        let named = levels.chain(compared);
         faults.extend(named.filter_map(|(name, place)| document.unknown_metric(name, place)));
-        let Some((Control { of, .. }, place, _)) = &entry.control else { continue };
+        let Some((Control { of, .. }, (place, _))) = control else { continue };
         if of == own {
             faults.push(Fault::new(place.clone(), format!("`{own}` cannot be its own control")));
         } else {
@@ -258,7 +244,7 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
 
 /// A duration counts steps: its methods count the episodes that still run at each of them.
 fn duration_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
-    let is_decimal = |name: &String| binding.metrics.get(name).is_some_and(|bound| bound.decimals > 0);
+    let is_decimal = |name: &String| binding.output(name).is_some_and(|output| output.decimals > 0);
     let durations = document.metrics.iter().filter(|(name, entry)| entry.said.finished.is_some() && is_decimal(name));
     let fault = |(name, entry): (&String, &file::MetricEntry)| {
         Fault::new(entry.finished.clone(), format!("the duration `{name}` has decimals; expected a number of steps"))
@@ -268,20 +254,15 @@ fn duration_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
 }
 
 fn level_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
-    let metrics = document.metrics.iter().map(|(name, entry)| (name, entry.chance, &entry.place));
-    let experiments = document.experiments.values().flat_map(|entry| {
-        let chance = entry.chance.iter();
-        let chance = chance.flat_map(|(name, (level, place))| {
-            level.iter().flat_map(Chance::levels).map(move |(_, level)| (name, Some(level), place))
-        });
-        let reference = entry.reference.iter();
-        chance.chain(reference.flat_map(|(name, (levels, place))| levels.iter().map(move |l| (name, Some(*l), place))))
+    let of_metrics = document.metrics.iter().filter_map(|(name, entry)| Some((name, entry.chance?, &entry.place)));
+    let of_experiments = document.experiments.values().flat_map(|entry| {
+        let levels = entry.experiment.levels();
+        levels.map(|(key, name, level)| (name, level, &entry.levels[&(key, name.clone())]))
     });
-    let improbable = |level: Ratio| level.numerator() < 0 || level.numerator() > level.denominator();
     let mut faults = Vec::new();
-    for (name, level, place) in metrics.chain(experiments) {
-        let is_rate = binding.metrics.get(name).is_some_and(|bound| bound.kind == Kind::Rate);
-        if let Some(level) = level.filter(|level| is_rate && improbable(*level)) {
+    for (name, level, place) in of_metrics.chain(of_experiments) {
+        let is_rate = binding.output(name).is_some_and(|output| output.kind == Kind::Rate);
+        if is_rate && !is_share(level) {
             let message = format!("the chance level of the rate `{name}` is {level}; expected a fraction from 0 to 1");
             faults.push(Fault::new(place.clone(), message));
         }
@@ -323,10 +304,9 @@ fn decimal_columns(document: &Document) -> IndexMap<String, DecimalColumn> {
 }
 
 fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
-    let metric = |(name, entry): (&String, &file::MetricEntry)| {
-        let bound = &binding.metrics[name];
-        let (kind, decimals) = (bound.kind, bound.decimals);
-        let default_unit = || match (&bound.unit, kind) {
+    let metric = |((name, entry), output): ((&String, &file::MetricEntry), &Output)| {
+        let (kind, decimals) = (output.kind, output.decimals);
+        let default_unit = || match (&binding.units[name], kind) {
             (Some(unit), Kind::Quantity) => unit.clone(),
             _ if decimals > 0 => String::new(),
             _ => kind.default_unit().to_owned(),
@@ -351,27 +331,15 @@ fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
         };
         (name.clone(), metric)
     };
-    document.metrics.iter().map(metric).collect()
+    document.metrics.iter().zip(&binding.plan.outputs).map(metric).collect()
 }
 
 fn experiments(document: &Document) -> IndexMap<String, Experiment> {
-    let mut experiments: IndexMap<String, Experiment> = document
-        .experiments
-        .iter()
-        .enumerate()
-        .map(|(position, (name, entry))| {
-            let position = i64::try_from(position).unwrap_or(i64::MAX);
-            let experiment = Experiment {
-                title: entry.title.clone(),
-                order: entry.order.unwrap_or(position.saturating_add(1)),
-                chance: entry.chance.iter().map(|(name, (level, _))| (name.clone(), level.clone())).collect(),
-                reference: entry.reference.iter().map(|(name, (levels, _))| (name.clone(), levels.clone())).collect(),
-                is_declared: false,
-                control: entry.control.as_ref().map(|(control, ..)| control.clone()),
-            };
-            (name.clone(), experiment)
-        })
-        .collect();
+    let experiment = |(position, (name, entry)): (i64, (&String, &file::ExperimentEntry))| {
+        let order = entry.order.unwrap_or(position);
+        (name.clone(), Experiment { order, ..entry.experiment.clone() })
+    };
+    let mut experiments: IndexMap<String, Experiment> = (1..).zip(&document.experiments).map(experiment).collect();
     experiments.sort_by(by_order);
     experiments
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::catalogs::catalog::{Control, Factor};
+use super::catalogs::catalog::{Experiment, Factor};
 use super::columns::{Column, Level};
 use super::shape::{ColumnShape, DefinitionFile, ExperimentShape, MetricShape};
 use crate::columns::Type;
@@ -89,13 +89,14 @@ pub struct MetricEntry {
 /// An `[experiment.NAME]` table.
 #[derive(Clone, Debug)]
 pub struct ExperimentEntry {
-    pub title: String,
+    /// As in the catalog, except that its `order` is open.
+    pub experiment: Experiment,
     /// `order`; the position in the file if absent.
     pub order: Option<i64>,
-    pub chance: IndexMap<String, (Option<Chance>, Place)>,
-    pub reference: IndexMap<String, (Vec<Ratio>, Place)>,
-    /// `control`, with the places of its experiment and of its metrics.
-    pub control: Option<(Control, Place, Vec<Place>)>,
+    /// The places of the metrics in `chance` and `reference`, by the key and the metric.
+    pub levels: IndexMap<(&'static str, String), Place>,
+    /// The places of the experiment and of the metrics in `control`.
+    pub control: Option<(Place, Vec<Place>)>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -222,18 +223,21 @@ pub fn chance_level(at: &At<'_>, faults: &mut Vec<Fault>) -> Option<Option<Chanc
 
 impl ExperimentEntry {
     fn new(said: ExperimentShape, at: &At<'_>, faults: &mut Vec<Fault>) -> Self {
-        let chance = at
-            .within("chance")
-            .filter_map(|(metric, at)| Some((metric.to_owned(), (chance_level(&at, faults)?, at.name_place()))));
-        let chance = chance.collect();
-        let reference = at.within("reference").map(|(metric, at)| {
-            let levels = at.items().filter_map(|level| level.parse(faults)).collect();
-            (metric.to_owned(), (levels, at.name_place()))
-        });
-        let reference = reference.collect();
-        let control = said.control.zip(at.get("control"));
-        let control = control
-            .map(|(control, at)| (control, at.key("of").place(), at.within("on").map(|(_, at)| at.place()).collect()));
-        Self { title: said.title, order: said.order, chance, reference, control }
+        let mut levels = IndexMap::new();
+        let (mut chance, mut reference) = (IndexMap::new(), IndexMap::new());
+        for (metric, at) in at.within("chance") {
+            let Some(level) = chance_level(&at, faults) else { continue };
+            chance.insert(metric.to_owned(), level);
+            levels.insert(("chance", metric.to_owned()), at.name_place());
+        }
+        for (metric, at) in at.within("reference") {
+            reference.insert(metric.to_owned(), at.items().filter_map(|level| level.parse(faults)).collect());
+            levels.insert(("reference", metric.to_owned()), at.name_place());
+        }
+        let places =
+            at.get("control").map(|at| (at.key("of").place(), at.within("on").map(|(_, at)| at.place()).collect()));
+        let ExperimentShape { title, order, control, .. } = said;
+        let experiment = Experiment { title, order: 0, chance, reference, is_declared: false, control };
+        Self { experiment, order, levels, control: places }
     }
 }

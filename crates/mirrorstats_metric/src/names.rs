@@ -6,34 +6,29 @@ use super::syntax::{Expr, ExprKind, parse};
 /// the text is not an expression.
 pub fn mentioned(expression: &str) -> Vec<String> {
     let mut found = Vec::new();
-    if let Ok(expr) = parse(expression) {
-        add(&expr, &mut found);
+    for part in parse(expression).iter().flat_map(all_parts) {
+        if let ExprKind::Name(name) = &part.kind
+            && !found.contains(name)
+        {
+            found.push(name.clone());
+        }
     }
     found
 }
 
 /// Returns true if an expression uses only values of these names, and no aggregates of steps.
 pub fn is_about(expression: &str, is_known: &dyn Fn(&str) -> bool) -> bool {
-    fn holds(expr: &Expr, is_known: &dyn Fn(&str) -> bool) -> bool {
-        let own = match &expr.kind {
-            ExprKind::Name(name) => is_known(name),
-            ExprKind::Call { name, .. } => matches!(name.as_str(), "coalesce" | "nullif" | "div" | "regexp_like"),
-            _ => true,
-        };
-        own && parts(expr).into_iter().all(|part| holds(part, is_known))
-    }
-    parse(expression).is_ok_and(|expr| holds(&expr, is_known))
+    let holds = |part: &Expr| match &part.kind {
+        ExprKind::Name(name) => is_known(name),
+        ExprKind::Call { name, .. } => matches!(name.as_str(), "coalesce" | "nullif" | "div" | "regexp_like"),
+        _ => true,
+    };
+    parse(expression).is_ok_and(|expr| all_parts(&expr).into_iter().all(holds))
 }
 
-fn add(expr: &Expr, found: &mut Vec<String>) {
-    if let ExprKind::Name(name) = &expr.kind
-        && !found.contains(name)
-    {
-        found.push(name.clone());
-    }
-    for part in parts(expr) {
-        add(part, found);
-    }
+/// An expression and all that it is made of, in the order of the text.
+fn all_parts(expr: &Expr) -> Vec<&Expr> {
+    std::iter::once(expr).chain(parts(expr).into_iter().flat_map(all_parts)).collect()
 }
 
 /// The subexpressions of an expression, in the order of the text.

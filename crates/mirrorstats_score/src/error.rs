@@ -1,7 +1,5 @@
 //! Errors of scoring: of a batch, and of traces.
 
-use arrow::error::ArrowError;
-
 use super::tables::declared_experiments::DeclarationError;
 use mirrorstats_exact::budget::Exceeded;
 use mirrorstats_metric::catalogs::restore::RestoreError;
@@ -51,13 +49,4 @@ pub enum ScoreError {
     Label { name: String, known: Vec<String>, help: String },
     #[error("{file}: {source}")]
     Engine { file: String, source: EngineError },
-}
-
-/// An error of evaluating a step: the step's own, or a kernel's, whose metric is determined later.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum StepError {
-    #[error(transparent)]
-    Engine(#[from] EngineError),
-    #[error(transparent)]
-    Kernel(#[from] ArrowError),
 }

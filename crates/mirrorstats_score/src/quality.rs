@@ -7,13 +7,12 @@
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 
-use arrow::array::{
-    Array as _, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Int32Array, StringArray, UInt8Array,
-};
-use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
+use arrow::array::{Array as _, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray};
+use arrow::datatypes::{Float64Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::kernels::vectors::Coded;
 use super::tables::builder::episode_ids;
 use super::tables::table::{CONDITION, UnusableCount, default_text};
 use mirrorstats_identification::UNREADABLE;
@@ -239,13 +238,13 @@ impl QualityReader {
     pub fn read(&self, batch: &EpisodeBatch, kept: Option<&BooleanArray>) -> QualityByCell {
         let mut cells = ReplyCells::default();
         let columns = ReplyColumns::of(batch);
-        let keys = ["experiment", "model", CONDITION].map(|name| batch.episodes.column_by_name(name));
+        let keys = ["experiment", "model", CONDITION].map(|name| Coded::of(&[], &batch.episodes, name));
         let ids = if columns.texts[0].is_some() { episode_ids(batch) } else { Vec::new() };
         for (episode, rows) in batch.offsets.windows(2).enumerate() {
             if kept.is_some_and(|kept| !(kept.is_valid(episode) && kept.value(episode))) {
                 continue;
             }
-            let counts = cells.at(keys, episode);
+            let counts = cells.at(&keys, episode);
             counts.rest.episodes += 1;
             counts.rest.steps += (rows[1] - rows[0]) as u64;
             if !self.columns.is_empty() {
@@ -272,10 +271,10 @@ struct Counts {
 }
 
 impl ReplyCells {
-    fn at(&mut self, keys: [Option<&ArrayRef>; 3], episode: usize) -> &mut Counts {
-        let codes = keys.map(|column| column?.as_dictionary_opt::<Int32Type>()?.key(episode));
+    fn at(&mut self, keys: &[Option<Coded<'_>>; 3], episode: usize) -> &mut Counts {
+        let codes = keys.each_ref().map(|column| column.as_ref()?.code(episode));
         let at = *self.known.entry(codes).or_insert_with(|| {
-            let [experiment, model, condition] = [0, 1, 2].map(|at| text(keys[at], codes[at]));
+            let [experiment, model, condition] = [0, 1, 2].map(|at| Some(keys[at].as_ref()?.texts.value(codes[at]?)));
             let key = CellKey {
                 experiment: experiment.unwrap_or_default().to_owned(),
                 model: model.unwrap_or_default().to_owned(),
@@ -303,11 +302,6 @@ impl ReplyCells {
     }
 }
 
-fn text(column: Option<&ArrayRef>, code: Option<usize>) -> Option<&str> {
-    let texts = column?.as_dictionary_opt::<Int32Type>()?.values().as_string::<i32>();
-    code.map(|code| texts.value(code))
-}
-
 fn named(column: Option<&Coded<'_>>, counts: &[u64]) -> Vec<(String, u64)> {
     let all = counts.iter().enumerate().filter(|(_, count)| **count > 0);
     all.filter_map(|(code, count)| Some((column?.texts.value(code).to_owned(), *count))).collect()
@@ -322,7 +316,7 @@ struct ReplyColumns<'a> {
 impl<'a> ReplyColumns<'a> {
     fn of(batch: &'a EpisodeBatch) -> Self {
         let numbers = NUMBERS.map(|name| batch.steps.column_by_name(name));
-        Self { texts: TEXTS.map(|name| Coded::of(batch, name)), numbers }
+        Self { texts: TEXTS.map(|name| Coded::of(&batch.texts, &batch.steps, name)), numbers }
     }
 
     fn replies(&self, rows: Range<usize>) -> Option<UnusableCount> {
@@ -375,34 +369,6 @@ fn rounded(value: f64) -> i128 {
     #[expect(clippy::cast_precision_loss, reason = "it is below 2^52")]
     let rest = value - whole as f64;
     i128::from(whole + i64::from(rest >= 0.5) - i64::from(rest <= -0.5))
-}
-
-/// A text column as indices of its distinct values.
-struct Coded<'a> {
-    codes: Codes<'a>,
-    texts: &'a StringArray,
-}
-
-enum Codes<'a> {
-    Bytes(&'a UInt8Array),
-    Keys(&'a Int32Array),
-}
-
-impl<'a> Coded<'a> {
-    fn of(batch: &'a EpisodeBatch, name: &str) -> Option<Self> {
-        if let Some(texts) = batch.texts.iter().find(|texts| texts.name == name) {
-            return Some(Self { codes: Codes::Bytes(&texts.keys), texts: &texts.texts });
-        }
-        let column = batch.steps.column_by_name(name)?.as_dictionary_opt::<Int32Type>()?;
-        Some(Self { codes: Codes::Keys(column.keys()), texts: column.values().as_string() })
-    }
-
-    fn code(&self, row: usize) -> Option<usize> {
-        match self.codes {
-            Codes::Bytes(codes) => codes.is_valid(row).then(|| codes.value(row).into()),
-            Codes::Keys(codes) => codes.is_valid(row).then(|| usize::try_from(codes.value(row)).ok())?,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -11,37 +11,40 @@ use mirrorstats_trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 
 /// The schema's columns, which definitions may name whether or not the traces have them.
 pub fn schema_columns() -> Columns {
-    let known = |column: &schema::Column| {
-        let level = if column.constant { Level::Episode } else { Level::Step };
-        let known = KnownColumn {
-            column: Column { ty: type_of(column.stored.kind())?, level },
-            origin: if is_general(column.name) { ColumnOrigin::Schema } else { ColumnOrigin::Mirror },
-            values: column.values.iter().map(ToString::to_string).collect(),
-            // A trace without a required column is an exception that its experiment declares.
-            fallback: column.default.map(|expression| Fallback { expression, is_read: column.required }),
-            decimals: None,
-        };
-        Some((column.name, known))
-    };
-    COLUMNS.iter().filter(|column| column.name != "t").filter_map(known).collect()
+    // A trace without a required column is an exception that its experiment declares.
+    of_schema(COLUMNS.iter(), |column| column.required)
 }
 
 /// The columns that definitions may name before any trace is open: like [`schema_columns`], but each row may have a
 /// value.
 pub fn unknown_columns() -> Columns {
-    let mut columns = schema_columns();
-    columns.set_read(|_| true);
-    columns
+    of_schema(COLUMNS.iter(), |_| true)
+}
+
+fn of_schema<'c>(
+    columns: impl Iterator<Item = &'c schema::Column>,
+    is_read: impl Fn(&schema::Column) -> bool,
+) -> Columns {
+    let known = |column: &'c schema::Column| {
+        let level = if column.constant { Level::Episode } else { Level::Step };
+        let fallback = |expression| Fallback { expression, is_read: is_read(column) };
+        let known = KnownColumn {
+            column: Column { ty: type_of(column.stored.kind())?, level },
+            origin: if is_general(column.name) { ColumnOrigin::Schema } else { ColumnOrigin::Mirror },
+            values: column.values.iter().map(ToString::to_string).collect(),
+            fallback: column.default.map(fallback),
+            decimals: None,
+        };
+        Some((column.name, known))
+    };
+    columns.filter(|column| column.name != "t").filter_map(known).collect()
 }
 
 /// The columns that definitions may name over these traces: the schema's and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
-    let mut columns =
-        schema_columns().with_help("`mirrorstats trace schema`, `trace info` and `trace labels` list the columns");
-    columns.set_read(|name| traces.declares(name));
-    for column in COLUMNS.iter().filter(|column| !traces.knows(column)) {
-        columns.forget(column.name);
-    }
+    let known = COLUMNS.iter().filter(|column| traces.knows(column));
+    let mut columns = of_schema(known, |column| traces.declares(column.name))
+        .with_help("`mirrorstats trace schema`, `trace info` and `trace labels` list the columns");
     for name in traces.label_columns() {
         columns.add(name, KnownColumn::new(Column { ty: Type::Bool, level: Level::Episode }, ColumnOrigin::Schema));
     }

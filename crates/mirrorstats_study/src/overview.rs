@@ -67,9 +67,5 @@ pub fn overview(study: &Study, results: Results, style: &str, part: Part) -> Res
 }
 
 fn groups(cells: &Cells) -> Vec<Vec<Option<String>>> {
-    let text = |value: &KeyValue| match value {
-        KeyValue::Missing => None,
-        value => Some(value.to_string()),
-    };
-    cells.groups.iter().map(|group| group.key.iter().map(text).collect()).collect()
+    cells.groups.iter().map(|group| group.key.iter().map(KeyValue::text).collect()).collect()
 }

@@ -8,8 +8,8 @@ use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use polars::prelude::{
-    AnyValue, Column, CsvWriter, DataFrame, Engine, IntoLazy as _, JsonFormat, JsonWriter, LazyFrame, ParquetWriter,
-    PlanCallback, PolarsResult, SerWriter as _, col,
+    AnyValue, CsvWriter, DataFrame, Engine, IntoLazy as _, JsonFormat, JsonWriter, LazyFrame, ParquetWriter,
+    PlanCallback, PolarsResult, SerWriter as _, col, df,
 };
 
 use super::accepted::Kind;
@@ -55,12 +55,12 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
         relations.insert(table, Relation { frame, columns });
     }
     match &query.asked {
-        Asked::Tables => Ok(listed("name", Table::ALL.map(Table::name), None)?),
+        Asked::Tables => Ok(df!("name" => Table::ALL.map(Table::name)).map_err(PolarsError::from)?.lazy()),
         Asked::Columns(table) => {
             let columns = relations.get(table).into_iter().flat_map(|relation| &relation.columns);
             let (names, types): (Vec<_>, Vec<_>) =
                 columns.map(|column| (column.name.as_str(), sql_type(&column.value))).unzip();
-            Ok(listed("column_name", names, Some(types))?)
+            Ok(df!("column_name" => names, "column_type" => types).map_err(PolarsError::from)?.lazy())
         }
         Asked::Rows(rows) => {
             let planned = with_stack(&query.source.text, || {
@@ -87,17 +87,6 @@ fn named(relation: Relation) -> Result<LazyFrame, QueryError> {
     // Types are resolved here, before a row is read.
     frame.collect_schema().map_err(PolarsError::from)?;
     Ok(frame)
-}
-
-fn listed<T: AsRef<str>>(
-    name: &str,
-    names: impl AsRef<[T]>,
-    types: Option<Vec<&str>>,
-) -> Result<LazyFrame, PolarsError> {
-    let texts: Vec<&str> = names.as_ref().iter().map(AsRef::as_ref).collect();
-    let mut columns = vec![Column::new(name.into(), &texts)];
-    columns.extend(types.map(|types| Column::new("column_type".into(), types)));
-    Ok(DataFrame::new(texts.len(), columns)?.lazy())
 }
 
 fn sql_type(value: &Value) -> &'static str {

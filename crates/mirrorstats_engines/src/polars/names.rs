@@ -16,6 +16,18 @@ pub(super) fn integer(ast: &Expr) -> Option<i64> {
     }
 }
 
+/// The table, if it is given, and the name of a column.
+pub(super) fn reference(ast: &Expr) -> Option<(Option<&Ident>, &Ident)> {
+    match ast {
+        Expr::Identifier(name) => Some((None, name)),
+        Expr::CompoundIdentifier(parts) => match parts.as_slice() {
+            [table, name] => Some((Some(table), name)),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
 pub(super) fn column_name(expr: &Expr) -> String {
     match expr {
         Expr::Nested(inner) => column_name(inner),

@@ -3,6 +3,7 @@
 use std::cell::Cell;
 
 use polars::prelude::{Expr, LazyFrame, SortMultipleOptions, col};
+use sqlparser::ast::Ident;
 
 use super::value::Value;
 
@@ -54,28 +55,17 @@ impl Relation {
     }
 }
 
-/// A resolved name.
-pub(super) enum Found<'c> {
-    One(&'c Column),
-    Several,
-    None,
-}
-
-/// The column of a name: the exact name first, then in any case, as in DuckDB.
-pub(super) fn find<'c>(columns: &'c [Column], table: Option<&str>, name: &str) -> Found<'c> {
+/// The columns of a name: those with the exact name, else those with it in any case, as in DuckDB.
+pub(super) fn find<'c>(columns: &'c [Column], table: Option<&Ident>, name: &Ident) -> Vec<&'c Column> {
     let of_table = |column: &&Column| match table {
-        Some(table) => column.table.eq_ignore_ascii_case(table),
+        Some(table) => column.table.eq_ignore_ascii_case(&table.value),
         None => !column.hidden,
     };
-    for same in [str::eq, str::eq_ignore_ascii_case] {
-        let found: Vec<&Column> = columns.iter().filter(of_table).filter(|column| same(&column.name, name)).collect();
-        match found.as_slice() {
-            [] => {}
-            [one] => return Found::One(one),
-            _ => return Found::Several,
-        }
-    }
-    Found::None
+    let named = |same: fn(&str, &str) -> bool| {
+        columns.iter().filter(of_table).filter(|column| same(&column.name, &name.value)).collect::<Vec<_>>()
+    };
+    let exact = named(str::eq);
+    if exact.is_empty() { named(str::eq_ignore_ascii_case) } else { exact }
 }
 
 /// A key of ORDER BY.

@@ -10,8 +10,9 @@ use sqlparser::ast::{
 use sqlparser::tokenizer::Span;
 
 use super::accepted::{CASTS, Kind};
+use super::names::reference;
 use super::refused::{QueryError, QueryResult, Text};
-use super::relation::{Column, Found, Names, Order, Relation, find};
+use super::relation::{Column, Names, Order, Relation, find};
 use super::run::{self, PolarsError};
 use super::value::{Value, arithmetic, balanced, common, compare, one_of};
 use mirrorstats_exact::suggest::did_you_mean;
@@ -86,26 +87,18 @@ impl<'p, 's> Scope<'p, 's> {
 
     fn key(&self, ast: &Ast) -> Option<Value> {
         let keys = self.keys.as_ref().filter(|_| self.rows_of.is_none())?;
-        let row = match ast {
-            Ast::Identifier(name) => match find(&self.columns, None, &name.value) {
-                Found::One(column) => Some(column.value.clone()),
-                _ => None,
-            },
-            Ast::CompoundIdentifier(_) => self.compound(ast).ok(),
+        let row = reference(ast).and_then(|(table, name)| match find(&self.columns, table, name)[..] {
+            [column] => Some(&column.value),
             _ => None,
-        };
-        let same = |key: &&Key| &key.ast == ast || row.as_ref().is_some_and(|row| row.expr == key.row.expr);
+        });
+        let same = |key: &&Key| &key.ast == ast || row.is_some_and(|row| row.expr == key.row.expr);
         keys.iter().find(same).map(|key| key.grouped.clone())
     }
 
     fn expression(&mut self, ast: &Ast) -> QueryResult<Value> {
         match ast {
             Ast::Nested(inner) => self.value(inner),
-            Ast::Identifier(name) => self.identifier(ast, name),
-            Ast::CompoundIdentifier(parts) => {
-                let value = self.compound(ast)?;
-                parts.last().map_or_else(|| self.text.refuse(ast), |name| self.ungrouped(name, value))
-            }
+            Ast::Identifier(_) | Ast::CompoundIdentifier(_) => self.name(ast),
             Ast::Value(literal) => self.literal(ast, literal),
             Ast::BinaryOp { left, op: op @ (BinaryOperator::And | BinaryOperator::Or), right } => {
                 self.chain(left, op, right)
@@ -203,21 +196,27 @@ impl<'p, 's> Scope<'p, 's> {
         Ok((value, found.columns()[0].as_materialized_series().clone()))
     }
 
-    fn identifier(&mut self, ast: &Ast, name: &Ident) -> QueryResult<Value> {
-        match find(&self.columns, None, &name.value) {
-            Found::One(column) => {
-                let value = column.value.clone();
-                self.ungrouped(name, value)
+    fn name(&mut self, ast: &Ast) -> QueryResult<Value> {
+        let Some((table, name)) = reference(ast) else { return self.text.refuse(ast) };
+        let has = |table: &Ident| self.columns.iter().any(|column| column.table.eq_ignore_ascii_case(&table.value));
+        match (find(&self.columns, table, name).as_slice(), table) {
+            ([column], _) => self.ungrouped(name, column.value.clone()),
+            ([], Some(table)) if !has(table) => {
+                Err(self.text.fault(table.span, format!("unknown table `{}`", table.value)).into())
             }
-            Found::Several => self.ambiguous(name),
-            Found::None => {
-                let alias = self.aliases.iter().find(|(alias, _)| alias.eq_ignore_ascii_case(&name.value));
-                match alias.cloned() {
-                    Some((_, meant)) if &meant != ast => self.value(&meant),
-                    _ => self.unknown(name),
-                }
-            }
+            ([], None) => match self.alias(name) {
+                Some(meant) if &meant != ast => self.value(&meant),
+                _ => self.unknown(name),
+            },
+            ([], Some(_)) => self.unknown(name),
+            _ => self.ambiguous(name),
         }
+    }
+
+    /// The selected expression of an alias.
+    pub(super) fn alias(&self, name: &Ident) -> Option<Ast> {
+        let alias = self.aliases.iter().find(|(alias, _)| alias.eq_ignore_ascii_case(&name.value));
+        alias.map(|(_, meant)| meant.clone())
     }
 
     fn ambiguous<T>(&self, name: &Ident) -> QueryResult<T> {
@@ -225,19 +224,6 @@ impl<'p, 's> Scope<'p, 's> {
         let one = |column: &Column| format!("{}.{}", column.table, column.name);
         let help = format!("write one of {}", tables.map(one).collect::<Vec<_>>().join(", "));
         Err(self.text.fault(name.span, format!("several tables have a column `{}`", name.value)).help(help).into())
-    }
-
-    fn compound(&self, ast: &Ast) -> QueryResult<Value> {
-        let Ast::CompoundIdentifier(parts) = ast else { return self.text.refuse(ast) };
-        let [table, name] = parts.as_slice() else { return self.text.refuse(ast) };
-        match find(&self.columns, Some(&table.value), &name.value) {
-            Found::One(column) => Ok(column.value.clone()),
-            Found::Several => self.ambiguous(name),
-            Found::None if self.columns.iter().any(|column| column.table.eq_ignore_ascii_case(&table.value)) => {
-                self.unknown(name)
-            }
-            Found::None => Err(self.text.fault(table.span, format!("unknown table `{}`", table.value)).into()),
-        }
     }
 
     fn unknown<T>(&self, name: &Ident) -> QueryResult<T> {

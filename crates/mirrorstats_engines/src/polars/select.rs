@@ -10,10 +10,10 @@ use sqlparser::ast::{
 };
 
 use super::accepted::Kind;
-use super::names::{column_name, integer};
+use super::names::{column_name, integer, reference};
 use super::plan::Planner;
 use super::refused::QueryResult;
-use super::relation::{Column, Found, Order, Relation, find, sort};
+use super::relation::{Column, Order, Relation, find, sort};
 use super::run::PolarsError;
 use super::scope::{Key, Scope};
 use super::value::Value;
@@ -189,11 +189,7 @@ impl Scope<'_, '_> {
         let expr = self.names.keep(&mut self.prepared, expr);
         // A key may be named by its alias or by its expression.
         let meant = match key {
-            Ast::Identifier(name) if !matches!(find(&self.columns, None, &name.value), Found::One(_)) => self
-                .aliases
-                .iter()
-                .find(|(alias, _)| alias.eq_ignore_ascii_case(&name.value))
-                .map(|(_, ast)| ast.clone()),
+            Ast::Identifier(name) if find(&self.columns, None, name).len() != 1 => self.alias(name),
             _ => None,
         };
         let grouped = Value { expr, ..row.clone() };
@@ -222,13 +218,9 @@ impl Scope<'_, '_> {
     }
 
     fn name_of(&self, expr: &Ast) -> String {
-        let (table, name) = match expr {
-            Ast::Identifier(name) => (None, name),
-            Ast::CompoundIdentifier(parts) if parts.len() == 2 => (Some(parts[0].value.as_str()), &parts[1]),
-            _ => return column_name(expr),
-        };
-        match find(&self.columns, table, &name.value) {
-            Found::One(column) => column.name.clone(),
+        let Some((table, name)) = reference(expr) else { return column_name(expr) };
+        match find(&self.columns, table, name)[..] {
+            [column] => column.name.clone(),
             _ => name.value.clone(),
         }
     }

@@ -9,7 +9,7 @@ use polars::prelude::{
 
 use super::run::{PolarsError, collect};
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_score::cells::{Cell, Cells, KeyValue};
+use mirrorstats_score::cells::{Cell, Cells};
 use mirrorstats_score::tables::select::{is_of_coders, truths_of};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef, MetricColumn};
 use mirrorstats_score::vocabulary::kind_in;
@@ -139,7 +139,7 @@ pub fn cells(cells: &Cells) -> Result<LazyFrame, PolarsError> {
     let rows: Vec<Cell> = cells.all().collect();
     let mut columns = Vec::new();
     for (at, name) in cells.by.iter().enumerate() {
-        let texts: Vec<Option<String>> = rows.iter().map(|row| text_of(&row.key[at])).collect();
+        let texts: Vec<Option<String>> = rows.iter().map(|row| row.key[at].text()).collect();
         columns.push(Column::new(name.as_str().into(), texts));
     }
     let int = |name: &str, of: fn(&Moments) -> i128| {
@@ -159,11 +159,4 @@ pub fn cells(cells: &Cells) -> Result<LazyFrame, PolarsError> {
     columns.push(float("ci_low", |row| row.interval.map(|interval| interval.low)));
     columns.push(float("ci_high", |row| row.interval.map(|interval| interval.high)));
     Ok(DataFrame::new(rows.len(), columns)?.lazy())
-}
-
-fn text_of(key: &KeyValue) -> Option<String> {
-    match key {
-        KeyValue::Missing => None,
-        other => Some(other.to_string()),
-    }
 }

@@ -117,7 +117,8 @@ pub(super) fn statement(rules: &[Rule]) -> String {
     )
 }
 
-#[cfg(all(test, feature = "polars"))]
+#[cfg(test)]
+#[cfg(feature = "polars")]
 mod tests {
     use std::collections::BTreeSet;
     use std::num::NonZeroUsize;

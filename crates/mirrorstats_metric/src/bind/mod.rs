@@ -17,7 +17,7 @@ use indexmap::IndexMap;
 use self::scope::Scope;
 use super::columns::{Columns, KnownColumn, Level, Type};
 use super::file::{Document, MetricEntry};
-use super::logical_plan::plan::{Builder, NodeId, Op, Plan};
+use super::logical_plan::plan::{Builder, Node, NodeId, Op, Output, Plan};
 use super::syntax;
 use crate::catalogs::catalog::Kind;
 use mirrorstats_exact::escape::visible;
@@ -35,21 +35,17 @@ pub(super) struct Bound {
     pub(super) decimals: u8,
 }
 
-#[derive(Clone, Debug)]
-pub(super) struct BoundMetric {
-    pub(super) node: NodeId,
-    pub(super) kind: Kind,
-    pub(super) decimals: u8,
-    /// The unit of the columns that its values come from, if that is one unit.
-    pub(super) unit: Option<String>,
-}
-
 #[derive(Debug)]
 pub(super) struct Binding {
     pub(super) plan: Plan,
-    pub(super) metrics: IndexMap<String, BoundMetric>,
-    pub(super) lets: Vec<(String, NodeId)>,
-    pub(super) filter: Option<NodeId>,
+    /// For each metric, the unit of the columns that its values come from, if that is one unit.
+    pub(super) units: IndexMap<String, Option<String>>,
+}
+
+impl Binding {
+    pub(super) fn output(&self, metric: &str) -> Option<&Output> {
+        self.plan.outputs.get(self.units.get_index_of(metric)?)
+    }
 }
 
 pub(super) fn bind(document: &Document, columns: &Columns, filter: Option<&Written>) -> Result<Binding, Vec<Fault>> {
@@ -64,22 +60,22 @@ pub(super) fn bind(document: &Document, columns: &Columns, filter: Option<&Writt
     };
     binder.check_names();
     let lets = document.lets.keys().filter_map(|name| Some((name.clone(), binder.definition(name)?.node))).collect();
-    let mut metrics = IndexMap::new();
-    for name in document.metrics.keys() {
-        if let Some(bound) = binder.definition(name) {
-            let declared = document.metrics[name].said.unit.as_deref() == Some("rate");
-            let kind = if bound.rate || declared { Kind::Rate } else { Kind::Quantity };
-            let (node, decimals) = (bound.node, bound.decimals);
-            metrics.insert(name.clone(), BoundMetric { node, kind, decimals, unit: binder.unit_of(node) });
+    let (mut outputs, mut units) = (Vec::new(), IndexMap::new());
+    for (name, entry) in &document.metrics {
+        if let Some(Bound { node, rate, decimals, .. }) = binder.definition(name) {
+            let is_rate = rate || entry.said.unit.as_deref() == Some("rate");
+            let kind = if is_rate { Kind::Rate } else { Kind::Quantity };
+            outputs.push(Output { name: name.clone(), kind, decimals, node });
+            units.insert(name.clone(), binder.unit_of(node));
         }
     }
     let filter = filter.and_then(|written| binder.condition(written, "a filter of episodes"));
-    let filter = filter.map(|bound| bound.node);
-    if binder.faults.is_empty() {
-        Ok(Binding { plan: binder.builder.finish(), metrics, lets, filter })
-    } else {
-        Err(binder.faults)
+    if !binder.faults.is_empty() {
+        return Err(binder.faults);
     }
+    let mut plan = binder.builder.finish();
+    (plan.outputs, plan.lets, plan.filter) = (outputs, lets, filter.map(|bound| bound.node));
+    Ok(Binding { plan, units })
 }
 
 enum State {
@@ -208,25 +204,31 @@ impl Binder<'_> {
     /// The unit that the columns declare whose values are in this node's value.
     fn unit_of(&self, node: NodeId) -> Option<String> {
         let mut units = BTreeSet::new();
-        let (mut seen, mut todo) = (HashSet::new(), vec![node]);
-        while let Some(node) = todo.pop() {
-            if !seen.insert(node) {
-                continue;
-            }
-            match &self.builder.node(node).op {
-                Op::Column(name) => {
-                    units.extend(self.document.columns.get(name).map(|entry| entry.unit.as_str()));
-                }
+        self.walk(node, |node, todo| {
+            match &node.op {
+                Op::Column(name) => units.extend(self.document.columns.get(name).map(|entry| entry.unit.as_str())),
                 Op::Case { branches, otherwise } => {
                     todo.extend(branches.iter().map(|(_, value)| *value).chain(*otherwise));
                 }
                 Op::At(value, _) => todo.push(*value),
-                op if self.builder.node(node).ty == Type::Int && !op.counts() => todo.extend(op.operands()),
+                op if node.ty == Type::Int && !op.counts() => todo.extend(op.operands()),
                 _ => {}
             }
-        }
+            Some(())
+        })?;
         let mut units = units.into_iter().filter(|unit| !unit.is_empty());
         units.next().filter(|_| units.next().is_none()).map(str::to_owned)
+    }
+
+    /// Visits a node and those that each visit adds, each once; `None` as soon as a visit gives it.
+    fn walk(&self, from: NodeId, mut visit: impl FnMut(&Node, &mut Vec<NodeId>) -> Option<()>) -> Option<()> {
+        let (mut seen, mut todo) = (HashSet::new(), vec![from]);
+        while let Some(node) = todo.pop() {
+            if seen.insert(node) {
+                visit(self.builder.node(node), &mut todo)?;
+            }
+        }
+        Some(())
     }
 
     fn at_episode(&mut self, bound: Bound, ty: Type) -> Bound {

@@ -25,7 +25,7 @@ impl Scope<'_, '_> {
         let (op, level) = match (level, op) {
             (Level::Constant, op @ Op::Constant(_)) => (op, level),
             (Level::Constant, op) => {
-                let op = op.with_operands(|operand| {
+                let op = op.map(|operand| {
                     let ty = self.binder.builder.node(operand).ty;
                     self.binder.spread(operand, ty, Level::Constant, Level::Episode)
                 });

@@ -4,8 +4,6 @@
 //! `coalesce` over such values and literals. Everything else may be any text. Comparisons by order are not checked,
 //! since they also make sense with other texts (`x between 'turn' and 'turn~'`).
 
-use std::collections::HashSet;
-
 use super::super::logical_plan::plan::{Constant, NodeId, Op};
 use super::super::syntax::Expr;
 use super::scope::Scope;
@@ -44,12 +42,8 @@ impl Binder<'_> {
     /// The possible values of a node except null; `None` if any text is possible.
     fn possible(&self, node: NodeId) -> Option<PossibleValues> {
         let mut possible = PossibleValues::default();
-        let (mut seen, mut todo) = (HashSet::new(), vec![node]);
-        while let Some(node) = todo.pop() {
-            if !seen.insert(node) {
-                continue;
-            }
-            match &self.builder.node(node).op {
+        self.walk(node, |node, todo| {
+            match &node.op {
                 Op::Column(name) => {
                     let values = &self.columns.known(name)?.values;
                     possible.texts.extend_from_slice(Some(values).filter(|values| !values.is_empty())?);
@@ -65,7 +59,8 @@ impl Binder<'_> {
                 }
                 _ => return None,
             }
-        }
+            Some(())
+        })?;
         Some(possible)
     }
 }

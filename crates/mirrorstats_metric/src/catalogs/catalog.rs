@@ -202,6 +202,24 @@ pub struct Experiment {
     pub control: Option<Control>,
 }
 
+impl Experiment {
+    /// Each level that it has: `chance` or `reference`, the metric, the value.
+    pub fn levels(&self) -> impl Iterator<Item = (&'static str, &String, Ratio)> {
+        let chance = self.chance.iter().flat_map(|(metric, level)| {
+            level.iter().flat_map(Chance::levels).map(move |(_, level)| ("chance", metric, level))
+        });
+        let reference = self.reference.iter();
+        let reference =
+            reference.flat_map(|(metric, levels)| levels.iter().map(move |level| ("reference", metric, *level)));
+        chance.chain(reference)
+    }
+}
+
+/// Returns true if a rate can have this level.
+pub fn is_share(level: Ratio) -> bool {
+    (0..=level.denominator()).contains(&level.numerator())
+}
+
 /// A number that a group of experiments varies, such as the steps by which a mirror is late.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

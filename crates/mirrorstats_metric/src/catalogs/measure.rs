@@ -6,6 +6,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::bind::Binding;
 use crate::catalogs::catalog::{Kind, Metric};
 use crate::file::{Document, MetricEntry};
 use mirrorstats_toml_spec::{Fault, Place};
@@ -90,8 +91,8 @@ pub(crate) fn relation_faults(document: &Document) -> Vec<Fault> {
     names.filter_map(|(_, name, place)| document.unknown_metric(name, place)).collect()
 }
 
-pub(crate) fn faults(document: &Document, kind: impl Fn(&str) -> Kind) -> Vec<Fault> {
-    let is_rate = |name: &str| document.metrics.contains_key(name) && kind(name) == Kind::Rate;
+pub(crate) fn faults(document: &Document, binding: &Binding) -> Vec<Fault> {
+    let is_rate = |name: &str| binding.output(name).is_some_and(|output| output.kind == Kind::Rate);
     let mut faults = Vec::new();
     for (name, entry) in &document.metrics {
         let mut refuse = |place: &Place, message: String, help: &str| {

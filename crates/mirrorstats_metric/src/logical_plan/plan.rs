@@ -27,53 +27,53 @@ pub struct Node {
 }
 
 /// The operations. Unless said otherwise, a null operand gives null (SQL's three-valued logic). Operands have one type
-/// and one level, except that any operand may be a constant.
+/// and one level, except that any operand may be a constant. An operand is a node here, and a step in a physical plan.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub enum Op {
+pub enum Op<N = NodeId> {
     Column(String),
     /// The timestep t, 1-based.
     Time,
     Length,
     Constant(Constant),
     /// An episode's value repeated at each of its steps, or a constant repeated at each episode or step.
-    Spread(NodeId),
-    Not(NodeId),
+    Spread(N),
+    Not(N),
     /// Kleene's conjunction: false if either is false.
-    And(NodeId, NodeId),
+    And(N, N),
     /// Kleene's disjunction: true if either is true.
-    Or(NodeId, NodeId),
-    Compare(Comparison, NodeId, NodeId),
+    Or(N, N),
+    Compare(Comparison, N, N),
     /// True if two values differ, with null as an ordinary value; never null.
-    Distinct(NodeId, NodeId),
+    Distinct(N, N),
     /// True if the value is null; never null.
-    IsNull(NodeId),
+    IsNull(N),
     /// True if a truth value is true; never null.
-    IsTrue(NodeId),
+    IsTrue(N),
     /// True if a truth value is false; never null.
-    IsFalse(NodeId),
+    IsFalse(N),
     /// Sum, difference, product, quotient or remainder; a result beyond 64 bits is an error.
-    Arithmetic(Arithmetic, NodeId, NodeId),
-    Negate(NodeId),
+    Arithmetic(Arithmetic, N, N),
+    Negate(N),
     /// The value after the first condition that is true, else the last value, else null.
     Case {
-        branches: Vec<(NodeId, NodeId)>,
-        otherwise: Option<NodeId>,
+        branches: Vec<(N, N)>,
+        otherwise: Option<N>,
     },
     /// The first value that is not null.
-    Coalesce(Vec<NodeId>),
+    Coalesce(Vec<N>),
     /// True if a text contains a match of a regular expression (syntax of the `regex` crate).
-    Matches(NodeId, String),
+    Matches(N, String),
     /// 1 for true, 0 for false.
-    IntFromBool(NodeId),
-    FloatFromInt(NodeId),
+    IntFromBool(N),
+    FloatFromInt(N),
     /// A float times this power of ten, rounded to an integer, halves away from zero. Other than finite values below
     /// 2^53 are errors.
-    Scale(NodeId, u8),
-    Aggregate(Aggregate, NodeId),
+    Scale(N, u8),
+    Aggregate(Aggregate, N),
     /// The value of the first operand at the timestep in the second; null if that step does not exist.
-    At(NodeId, NodeId),
+    At(N, N),
     /// The value at step t - 1 of the same episode; null at the first step.
-    Lag(NodeId),
+    Lag(N),
 }
 
 /// A constant; floats are stored as bits so that equal constants are one node.
@@ -214,6 +214,18 @@ impl Plan {
         (0..self.nodes.len()).filter(|&at| needed[at]).map(NodeId).collect()
     }
 
+    /// The comparison of `t` with a moment of the episode that a condition is, if it is one.
+    pub fn window(&self, condition: &Op) -> Option<(Comparison, NodeId)> {
+        match condition {
+            Op::Compare(comparison, left, right) if self.node(*left).op == Op::Time => match &self.node(*right).op {
+                Op::Spread(moment) => Some((*comparison, *moment)),
+                Op::Constant(_) => Some((*comparison, *right)),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
     pub fn columns(&self, nodes: &[NodeId]) -> Vec<(&str, Level)> {
         let column = |id: &NodeId| match &self.node(*id).op {
             Op::Column(name) => Some((name.as_str(), self.node(*id).level)),
@@ -223,7 +235,7 @@ impl Plan {
     }
 }
 
-impl Op {
+impl<N: Copy> Op<N> {
     /// Returns true if the result is a number of steps or a timestep, not a value of steps.
     pub(crate) const fn counts(&self) -> bool {
         matches!(
@@ -232,42 +244,42 @@ impl Op {
         )
     }
 
-    pub fn operands(&self) -> Vec<NodeId> {
+    pub fn operands(&self) -> Vec<N> {
         let mut operands = Vec::new();
-        let _ = self.with_operands(|operand| {
-            operands.push(operand);
-            operand
-        });
+        let _ = self.map(|operand| operands.push(operand));
         operands
     }
 
     /// The same operation with each operand replaced by `to`, in order.
-    pub(crate) fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
+    pub fn map<M>(&self, mut to: impl FnMut(N) -> M) -> Op<M> {
         match self {
-            Self::Column(_) | Self::Time | Self::Length | Self::Constant(_) => self.clone(),
-            Self::Spread(x) => Self::Spread(to(*x)),
-            Self::Not(x) => Self::Not(to(*x)),
-            Self::And(x, y) => Self::And(to(*x), to(*y)),
-            Self::Or(x, y) => Self::Or(to(*x), to(*y)),
-            Self::Compare(comparison, x, y) => Self::Compare(*comparison, to(*x), to(*y)),
-            Self::Distinct(x, y) => Self::Distinct(to(*x), to(*y)),
-            Self::IsNull(x) => Self::IsNull(to(*x)),
-            Self::IsTrue(x) => Self::IsTrue(to(*x)),
-            Self::IsFalse(x) => Self::IsFalse(to(*x)),
-            Self::Arithmetic(op, x, y) => Self::Arithmetic(*op, to(*x), to(*y)),
-            Self::Negate(x) => Self::Negate(to(*x)),
-            Self::Case { branches, otherwise } => Self::Case {
+            Self::Column(name) => Op::Column(name.clone()),
+            Self::Time => Op::Time,
+            Self::Length => Op::Length,
+            Self::Constant(constant) => Op::Constant(constant.clone()),
+            Self::Spread(x) => Op::Spread(to(*x)),
+            Self::Not(x) => Op::Not(to(*x)),
+            Self::And(x, y) => Op::And(to(*x), to(*y)),
+            Self::Or(x, y) => Op::Or(to(*x), to(*y)),
+            Self::Compare(comparison, x, y) => Op::Compare(*comparison, to(*x), to(*y)),
+            Self::Distinct(x, y) => Op::Distinct(to(*x), to(*y)),
+            Self::IsNull(x) => Op::IsNull(to(*x)),
+            Self::IsTrue(x) => Op::IsTrue(to(*x)),
+            Self::IsFalse(x) => Op::IsFalse(to(*x)),
+            Self::Arithmetic(op, x, y) => Op::Arithmetic(*op, to(*x), to(*y)),
+            Self::Negate(x) => Op::Negate(to(*x)),
+            Self::Case { branches, otherwise } => Op::Case {
                 branches: branches.iter().map(|(when, then)| (to(*when), to(*then))).collect(),
                 otherwise: otherwise.map(&mut to),
             },
-            Self::Coalesce(values) => Self::Coalesce(values.iter().map(|value| to(*value)).collect()),
-            Self::Matches(x, pattern) => Self::Matches(to(*x), pattern.clone()),
-            Self::IntFromBool(x) => Self::IntFromBool(to(*x)),
-            Self::FloatFromInt(x) => Self::FloatFromInt(to(*x)),
-            Self::Scale(x, decimals) => Self::Scale(to(*x), *decimals),
-            Self::Aggregate(aggregate, x) => Self::Aggregate(*aggregate, to(*x)),
-            Self::At(x, moment) => Self::At(to(*x), to(*moment)),
-            Self::Lag(x) => Self::Lag(to(*x)),
+            Self::Coalesce(values) => Op::Coalesce(values.iter().map(|value| to(*value)).collect()),
+            Self::Matches(x, pattern) => Op::Matches(to(*x), pattern.clone()),
+            Self::IntFromBool(x) => Op::IntFromBool(to(*x)),
+            Self::FloatFromInt(x) => Op::FloatFromInt(to(*x)),
+            Self::Scale(x, decimals) => Op::Scale(to(*x), *decimals),
+            Self::Aggregate(aggregate, x) => Op::Aggregate(*aggregate, to(*x)),
+            Self::At(x, moment) => Op::At(to(*x), to(*moment)),
+            Self::Lag(x) => Op::Lag(to(*x)),
         }
     }
 }
@@ -303,6 +315,10 @@ impl Builder {
 
     pub(crate) fn node(&self, id: NodeId) -> &Node {
         self.plan.node(id)
+    }
+
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
     }
 
     pub(crate) fn finish(self) -> Plan {

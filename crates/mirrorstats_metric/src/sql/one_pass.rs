@@ -73,7 +73,7 @@ struct Rewriter<'p> {
 
 impl Rewriter<'_> {
     fn node(&mut self, node: &Node) -> NodeId {
-        let op = node.op.with_operands(|operand| self.new[operand.index()]);
+        let op = node.op.map(|operand| self.new[operand.index()]);
         match (&node.op, op) {
             (_, Op::Spread(x)) if node.level == Level::Step => self.spread(x, node.ty),
             (_, Op::Aggregate(aggregate, x)) => self.aggregate(aggregate, x, node.ty),
@@ -135,7 +135,7 @@ impl Rewriter<'_> {
         let new = match op {
             Op::Spread(constant) => constant,
             op => {
-                let op = op.with_operands(|operand| self.read_at_step(operand));
+                let op = op.map(|operand| self.read_at_step(operand));
                 self.add(op, ty, Level::Step)
             }
         };
@@ -162,20 +162,10 @@ impl Rewriter<'_> {
             match self.op(part) {
                 _ if self.is_local(part) => own = self.both(own, part, Level::Step),
                 Op::And(x, y) => open.extend([*y, *x]),
-                _ => windows.push(self.window(part)?),
+                op => windows.push(self.builder.plan().window(op)?),
             }
         }
         (!windows.is_empty()).then_some(Windowed { condition: own, windows })
-    }
-
-    fn window(&self, condition: NodeId) -> Option<(Comparison, NodeId)> {
-        match self.op(condition) {
-            Op::Compare(comparison, x, y) => match (self.op(*x), self.op(*y)) {
-                (Op::Time, Op::Spread(moment)) => Some((*comparison, *moment)),
-                _ => None,
-            },
-            _ => None,
-        }
     }
 
     fn search(&mut self, aggregate: Aggregate, x: NodeId, ty: Type, windowed: Windowed) -> NodeId {

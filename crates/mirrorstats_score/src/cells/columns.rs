@@ -5,7 +5,7 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Decimal128Array, Float64Array, Int64Array, RecordBatch, StringArray};
 use arrow::error::ArrowError;
 
-use super::{Cell, Cells, KeyValue};
+use super::{Cell, Cells};
 use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::{Kind, Metric};
 
@@ -16,7 +16,7 @@ pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
     let rows: Vec<Cell> = cells.all().collect();
     let mut columns: Vec<(&str, ArrayRef)> = Vec::new();
     for (at, name) in cells.by.iter().enumerate() {
-        columns.push((name, Arc::new(rows.iter().map(|row| text(&row.key[at])).collect::<StringArray>())));
+        columns.push((name, Arc::new(rows.iter().map(|row| row.key[at].text()).collect::<StringArray>())));
     }
     let decimals = rows.iter().map(|row| row.metric.decimals).max().unwrap_or(0);
     let beyond = |name: &str| ArrowError::ComputeError(format!("the column `{name}` of cells overflows its type"));
@@ -52,11 +52,4 @@ pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
 
 fn method(metric: &Metric) -> &'static str {
     if metric.kind == Kind::Rate { "wilson" } else { "student_t" }
-}
-
-fn text(key: &KeyValue) -> Option<String> {
-    match key {
-        KeyValue::Missing => None,
-        other => Some(other.to_string()),
-    }
 }

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::interval::ranges;
 use super::{Cells, Group, KeyValue};
-use crate::tables::table::{EpisodeTable, KeyRef, LabelColumn, TextColumn};
+use crate::tables::table::{EpisodeTable, TextColumn};
 use mirrorstats_exact::budget::{Exceeded, Limit};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_exact::suggest::hint;
@@ -85,8 +85,8 @@ fn repeated(table: &EpisodeTable, of_row: &[usize]) -> BTreeSet<usize> {
 
 /// The distinct values of a key column, a label or a metric; `None` for any other name.
 pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyValue>> {
-    if let Some(column) = column(table, name) {
-        return Some(column.ranks(table).values.into_iter().collect());
+    if let Some(ranks) = KeyRanks::of_column(table, name) {
+        return Some(ranks.values.into_iter().collect());
     }
     let metric = table.metric(name)?;
     Some(metric.iter().map(|value| value.map_or(KeyValue::Missing, KeyValue::Int)).collect())
@@ -104,7 +104,7 @@ struct Membership {
 
 impl Membership {
     fn of(table: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
-        let columns: Vec<KeyRanks> = columns(table, by)?.iter().map(|column| column.ranks(table)).collect();
+        let columns = columns(table, by)?;
         let ranks = |row: usize| columns.iter().map(move |column| column.of_row[row]);
         let mut seen: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
         let mut of_row: Vec<usize> = Vec::with_capacity(table.len());
@@ -137,12 +137,34 @@ struct KeyRanks {
 }
 
 impl KeyRanks {
-    /// A column of `rows` values with many duplicates: each row has a code, and each code a value.
-    fn of(rows: usize, code: impl Fn(usize) -> usize, value: impl Fn(usize) -> KeyValue) -> Self {
-        let mut of_row: Vec<usize> = (0..rows).map(code).collect();
+    /// The ranks of a key column or a label; `None` for any other name.
+    fn of_column(table: &EpisodeTable, name: &str) -> Option<Self> {
+        let keys = &table.keys;
+        Some(match name {
+            "experiment" => Self::of_texts(&keys.experiment, false),
+            "model" => Self::of_texts(&keys.model, false),
+            "seed" => Self::of_ints(keys.seed.values()),
+            "run" => Self::of_ints(keys.run.values()),
+            "episode_id" => Self::of_texts(&keys.episode_id, false),
+            label => {
+                let column = table.label(label)?;
+                Self::of_texts(column, column.iter().flatten().all(|text| canonical_integer(text).is_some()))
+            }
+        })
+    }
+
+    /// A text column with many duplicates: each row has a code, and each code a value.
+    fn of_texts(column: &TextColumn, are_integers: bool) -> Self {
+        // Null has its own code.
+        let mut of_row: Vec<usize> = column.codes.iter().map(|code| code.map_or(0, |code| code as usize + 1)).collect();
         let mut first = vec![None; of_row.iter().max().map_or(0, |most| most + 1)];
-        (0..rows).for_each(|row| first[of_row[row]] = first[of_row[row]].or(Some(row)));
-        let of_code: Vec<Option<KeyValue>> = first.into_iter().map(|row| row.map(&value)).collect();
+        of_row.iter().enumerate().for_each(|(row, &code)| first[code] = first[code].or(Some(row)));
+        let value = |row: usize| match column.get(row) {
+            None => KeyValue::Missing,
+            Some(text) if are_integers => canonical_integer(text).map_or(KeyValue::Missing, KeyValue::Int),
+            Some(text) => KeyValue::Text(text.to_owned()),
+        };
+        let of_code: Vec<Option<KeyValue>> = first.into_iter().map(|row| row.map(value)).collect();
         let mut values: Vec<KeyValue> = of_code.iter().flatten().cloned().collect();
         values.sort_unstable();
         values.dedup();
@@ -154,9 +176,8 @@ impl KeyRanks {
         Self { values, of_row }
     }
 
-    fn of_ints(ints: impl Iterator<Item = i32>) -> Self {
-        let ints: Vec<i32> = ints.collect();
-        let mut values = ints.clone();
+    fn of_ints(ints: &[i32]) -> Self {
+        let mut values = ints.to_vec();
         values.sort_unstable();
         values.dedup();
         let of_row = ints.iter().map(|value| values.binary_search(value).unwrap_or_default()).collect();
@@ -164,39 +185,7 @@ impl KeyRanks {
     }
 }
 
-enum KeyColumn<'a> {
-    Text(&'a TextColumn),
-    Int(fn(KeyRef<'_>) -> i32),
-    Label { column: &'a LabelColumn, is_integer: bool },
-}
-
-impl KeyColumn<'_> {
-    fn ranks(&self, table: &EpisodeTable) -> KeyRanks {
-        let of_text = |column: &TextColumn| {
-            // Null has its own code.
-            KeyRanks::of(table.len(), |row| column.code(row).map_or(0, |code| code + 1), |row| self.value(table, row))
-        };
-        match self {
-            Self::Int(of) => KeyRanks::of_ints(table.keys.iter().map(of)),
-            Self::Text(column) => of_text(column),
-            Self::Label { column, .. } => of_text(&column.values),
-        }
-    }
-
-    fn value(&self, table: &EpisodeTable, row: usize) -> KeyValue {
-        match self {
-            Self::Int(of) => KeyValue::Int(of(table.keys.get(row)).into()),
-            Self::Text(column) => column.get(row).map_or(KeyValue::Missing, |text| KeyValue::Text(text.to_owned())),
-            Self::Label { column, is_integer } => match column.values.get(row) {
-                None => KeyValue::Missing,
-                Some(text) if *is_integer => canonical_integer(text).map_or(KeyValue::Missing, KeyValue::Int),
-                Some(text) => KeyValue::Text(text.to_owned()),
-            },
-        }
-    }
-}
-
-fn columns<'a>(table: &'a EpisodeTable, by: &[String]) -> Result<Vec<KeyColumn<'a>>, GroupError> {
+fn columns(table: &EpisodeTable, by: &[String]) -> Result<Vec<KeyRanks>, GroupError> {
     let known = || known_columns(table);
     if by.is_empty() {
         return Err(GroupError::NoColumn { known: known().join(", ") });
@@ -206,7 +195,7 @@ fn columns<'a>(table: &'a EpisodeTable, by: &[String]) -> Result<Vec<KeyColumn<'
     }
     by.iter()
         .map(|name| {
-            column(table, name).ok_or_else(|| GroupError::UnknownColumn {
+            KeyRanks::of_column(table, name).ok_or_else(|| GroupError::UnknownColumn {
                 name: name.clone(),
                 known: known().join(", "),
                 hint: hint(name, known()),
@@ -217,21 +206,6 @@ fn columns<'a>(table: &'a EpisodeTable, by: &[String]) -> Result<Vec<KeyColumn<'
 
 fn known_columns(table: &EpisodeTable) -> Vec<&str> {
     KEY_COLUMNS.into_iter().chain(table.labels.iter().map(|label| label.name.as_str())).collect()
-}
-
-fn column<'a>(table: &'a EpisodeTable, name: &str) -> Option<KeyColumn<'a>> {
-    Some(match name {
-        "experiment" => KeyColumn::Text(&table.keys.experiment),
-        "model" => KeyColumn::Text(&table.keys.model),
-        "seed" => KeyColumn::Int(|key| key.seed),
-        "run" => KeyColumn::Int(|key| key.run),
-        "episode_id" => KeyColumn::Text(&table.keys.episode_id),
-        _ => {
-            let column = table.labels.iter().find(|label| label.name == name)?;
-            let is_integer = column.values.iter().flatten().all(|text| canonical_integer(text).is_some());
-            KeyColumn::Label { column, is_integer }
-        }
-    })
 }
 
 /// The integer that prints as exactly this text: `7`, but not `07` or `+7`.

@@ -116,6 +116,13 @@ pub enum KeyValue {
     Text(String),
 }
 
+impl KeyValue {
+    /// The value as text; `None` if it is missing.
+    pub fn text(&self) -> Option<String> {
+        (*self != Self::Missing).then(|| self.to_string())
+    }
+}
+
 impl fmt::Display for KeyValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

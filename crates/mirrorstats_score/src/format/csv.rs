@@ -91,14 +91,10 @@ pub(super) fn assemble(
     check_unique(&names)?;
     let mut positions = [0; 5];
     for (position, name) in positions.iter_mut().zip(KEYS) {
-        *position = header.iter().position(|column| column == name).ok_or_else(|| FormatError::Column {
-            column: name.to_owned(),
-            expected: "a key column of scores",
-            found: if header.is_empty() {
-                "no column".to_owned()
-            } else {
-                format!("the columns {}", header.join(", "))
-            },
+        *position = header.iter().position(|column| column == name).ok_or_else(|| {
+            let found =
+                if header.is_empty() { "no column".to_owned() } else { format!("the columns {}", header.join(", ")) };
+            FormatError::column(name, "a key column of scores", found)
         })?;
     }
     let is_label = |(_, name): &(usize, &String)| !KEYS.contains(&name.as_str()) && *name != DECLARED_KEY;
@@ -139,11 +135,7 @@ pub(super) fn assemble(
 pub(super) fn check_unique(names: &[&str]) -> Result<(), FormatError> {
     match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
         None => Ok(()),
-        Some((_, name)) => Err(FormatError::Column {
-            column: (*name).to_owned(),
-            expected: "one column of that name",
-            found: "more than one".to_owned(),
-        }),
+        Some((_, name)) => Err(FormatError::column(name, "one column of that name", "more than one")),
     }
 }
 

@@ -73,6 +73,10 @@ pub enum FormatError {
 }
 
 impl FormatError {
+    fn column(column: &str, expected: &'static str, found: impl Into<String>) -> Self {
+        Self::Column { column: column.to_owned(), expected, found: found.into() }
+    }
+
     /// The system's error, if there is one: usually a full disk or a closed pipe.
     pub fn into_io(self) -> Result<io::Error, Self> {
         match self {

@@ -254,11 +254,11 @@ fn at<A: ArrayAccessor + Copy>(values: A, row: usize) -> Option<A::Item> {
 }
 
 fn null(column: &str) -> FormatError {
-    FormatError::Column { column: column.to_owned(), expected: "a value in every row", found: "null".to_owned() }
+    FormatError::column(column, "a value in every row", "null")
 }
 
 fn column(batch: &RecordBatch, name: &str, ty: &DataType, expected: &'static str) -> Result<ArrayRef, FormatError> {
-    let fault = |found: String| FormatError::Column { column: name.to_owned(), expected, found };
+    let fault = |found: String| FormatError::column(name, expected, found);
     let column = batch.column_by_name(name).ok_or_else(|| fault("no such column".to_owned()))?;
     let fits = match ty {
         // Some engines widen an integer sum to a type that Parquet cannot store as an integer.
@@ -285,11 +285,7 @@ fn texts(batch: &RecordBatch, name: &str) -> Result<StringArray, FormatError> {
 /// The stored values of a metric. Other engines write decimals as doubles: the nearest decimal gives the double back.
 fn stored(batch: &RecordBatch, name: &str, catalog: &Catalog) -> Result<Int64Array, FormatError> {
     let DataType::Decimal128(digits, decimals) = columns::metric_type(catalog, name) else { return ints(batch, name) };
-    let fault = |found: String| FormatError::Column {
-        column: name.to_owned(),
-        expected: "numbers with the digits of the metric",
-        found,
-    };
+    let fault = |found: String| FormatError::column(name, "numbers with the digits of the metric", found);
     let column = batch.column_by_name(name).ok_or_else(|| fault("no such column".to_owned()))?;
     let exact = cast(column, &DataType::Decimal128(digits, decimals)).map_err(|error| fault(error.to_string()))?;
     let back = cast(&exact, column.data_type()).map_err(|error| fault(error.to_string()))?;

@@ -59,10 +59,8 @@ fn repeated(name: &str, value: Option<&str>, is_int: bool, rows: usize) -> Resul
     if !is_int {
         return Ok(Arc::new(StringArray::from(vec![value; rows])));
     }
-    let number: i64 = value.parse().map_err(|_| FormatError::Column {
-        column: name.to_owned(),
-        expected: "an integer in the name of the folder",
-        found: format!("`{value}`"),
-    })?;
+    let number: i64 = value
+        .parse()
+        .map_err(|_| FormatError::column(name, "an integer in the name of the folder", format!("`{value}`")))?;
     Ok(Arc::new(Int64Array::from(vec![number; rows])))
 }

@@ -2,21 +2,23 @@
 //!
 //! It deliberately does not know the source, order or thread of batches.
 
-use arrow::array::{Array, ArrayRef, AsArray as _, BooleanArray, Datum, RecordBatch, UInt32Array};
+use std::sync::Arc;
+
+use arrow::array::{Array, ArrayRef, AsArray as _, BooleanArray, Datum, RecordBatch, Scalar};
 use arrow::compute::kernels::window::shift;
 use arrow::compute::kernels::{boolean, cmp, numeric};
-use arrow::compute::{cast, filter as select, nullif};
-use arrow::datatypes::{DataType, Int64Type};
+use arrow::compute::{cast, filter as select, nullif, take};
+use arrow::datatypes::{DataType, Int64Type, UInt32Type};
 use arrow::error::ArrowError;
 
-use crate::error::{EngineError, StepError};
+use crate::error::EngineError;
 use crate::kernels::elementwise::{arithmetic, case, coalesce, compare, divide, numbers, scale};
 use crate::kernels::segments::{Segments, repeat, repeat_bool, test_symbols, truths};
-use crate::kernels::vectors::{Symbols, Vector};
+use crate::kernels::vectors::{Coded, Symbols, Vector};
 use crate::physical::{Kernel, Metric, PhysicalPlan, Scores, Shape, Step, StepId};
 use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_metric::columns::Type;
-use mirrorstats_metric::logical_plan::plan::{Aggregate, Comparison};
+use mirrorstats_metric::logical_plan::plan::{Aggregate, Arithmetic, Comparison, Op};
 use mirrorstats_trace::scan::Texts;
 
 /// Whole episodes as columns: one batch with a row per timestep, one with a row per episode.
@@ -45,24 +47,19 @@ impl PhysicalPlan {
         let vectors = Vec::with_capacity(self.steps.len());
         let mut evaluation = Evaluation { plan: self, batch, symbols: Symbols::default(), vectors };
         for (at, step) in self.steps.iter().enumerate() {
-            let vector = evaluation.step(StepId(at), step).map_err(|error| self.error(StepId(at), error))?;
+            let vector = evaluation.step(StepId(at), step)?;
             evaluation.vectors.push(vector);
         }
         Ok(Evaluated { vectors: evaluation.vectors, symbols: evaluation.symbols })
     }
 
-    fn error(&self, at: StepId, error: StepError) -> EngineError {
-        match error {
-            StepError::Engine(error) => error,
-            StepError::Kernel(reason) => {
-                let metric = self.metrics.get(&at).map_or("the filter", String::as_str).to_owned();
-                match (reason, &self.steps[at.0].kernel) {
-                    (ArrowError::CastError(value), Kernel::Scale(_, decimals)) => {
-                        EngineError::NotADecimal { metric, value, decimals: *decimals }
-                    }
-                    (reason, _) => EngineError::Overflow { metric, reason: reason.to_string() },
-                }
+    fn error(&self, at: StepId, reason: ArrowError) -> EngineError {
+        let metric = self.metrics.get(&at).map_or("the filter", String::as_str).to_owned();
+        match (reason, &self.step(at).kernel) {
+            (ArrowError::CastError(value), Kernel::Op(Op::Scale(_, decimals))) => {
+                EngineError::NotADecimal { metric, value, decimals: *decimals }
             }
+            (reason, _) => EngineError::Overflow { metric, reason: reason.to_string() },
         }
     }
 }
@@ -110,64 +107,71 @@ struct Evaluation<'e> {
     vectors: Vec<Vector>,
 }
 
-struct Operand<'a> {
-    array: &'a dyn Array,
-    is_one: bool,
-}
-
-impl Datum for Operand<'_> {
-    fn get(&self) -> (&dyn Array, bool) {
-        (self.array, self.is_one)
-    }
-}
-
 impl Evaluation<'_> {
     fn of(&self, id: StepId) -> &Vector {
         &self.vectors[id.0]
     }
 
-    fn operand(&self, id: StepId) -> Operand<'_> {
-        Operand { array: self.of(id).array(), is_one: self.plan.step(id).shape == Shape::One }
+    fn operand(&self, id: StepId) -> Box<dyn Datum> {
+        self.as_operand(id, self.of(id).array().clone())
     }
 
-    fn step(&mut self, id: StepId, step: &Step) -> Result<Vector, StepError> {
-        let segments = self.batch.segments;
+    /// Values of a step; one that represents all is a scalar.
+    fn as_operand(&self, id: StepId, values: ArrayRef) -> Box<dyn Datum> {
+        if self.plan.step(id).shape == Shape::One { Box::new(Scalar::new(values)) } else { Box::new(values) }
+    }
+
+    fn step(&mut self, id: StepId, step: &Step) -> Result<Vector, EngineError> {
         match &step.kernel {
-            Kernel::Column(name) => Ok(self.column(name, step.shape)?),
-            Kernel::Constant(constant) => Ok(Vector::constant(constant, step.ty, &mut self.symbols)),
-            Kernel::Times => Ok(segments.times().into()),
-            Kernel::Lengths => Ok(segments.lengths().into()),
-            Kernel::Repeat(x) => Ok(self.repeat(*x, step)),
-            Kernel::Spread(x) => Ok(self.spread(*x, step.ty)),
-            Kernel::Within(windows) => Ok(self.within(windows)),
-            Kernel::Search { aggregate, condition, within } => Ok(self.search(*aggregate, *condition, *within)),
-            Kernel::Fold(aggregate, x) => Ok(self.fold(*aggregate, *x)?),
-            Kernel::At { values, moments } => Ok(self.at(*values, *moments, step.ty)),
-            Kernel::Lag(x) => {
-                let shifted = shift(self.of(*x).array(), 1)?;
-                Ok(Vector::Array(nullif(&shifted, &segments.first_rows())?))
-            }
-            Kernel::NullWhereAbsent { values, moments } => {
-                let absent = BooleanArray::new(!&segments.exist(self.of(*moments).ints()), None);
-                Ok(Vector::Array(nullif(self.of(*values).array(), &absent)?))
-            }
-            kernel => Ok(self.elementwise(id, kernel, step.ty)?),
+            Kernel::Op(Op::Column(name)) => self.column(name, step.shape),
+            Kernel::Op(Op::Constant(constant)) => Ok(Vector::constant(constant, step.ty, &mut self.symbols)),
+            kernel => self.kernel(id, kernel, step).map_err(|reason| self.plan.error(id, reason)),
         }
+    }
+
+    fn kernel(&self, id: StepId, kernel: &Kernel, step: &Step) -> Result<Vector, ArrowError> {
+        let segments = self.batch.segments;
+        Ok(match kernel {
+            Kernel::Op(Op::Spread(x)) if self.plan.step(*x).shape == Shape::One => self.repeat(*x, step),
+            Kernel::Op(op) => self.operation(id, op, step.ty)?,
+            Kernel::Symbols(keys) => self.of(*keys).keyed().symbols().into(),
+            Kernel::CompareTexts(comparison, x, y) => {
+                let ranks = self.symbols.ranks();
+                let ranked = |id: StepId| {
+                    let rank = |symbol| ranks.get(symbol as usize).copied().unwrap_or(0);
+                    self.as_operand(id, Arc::new(self.of(id).symbols().unary::<_, UInt32Type>(rank)))
+                };
+                compare(*comparison, &*ranked(*x), &*ranked(*y))?.into()
+            }
+            Kernel::KeysEqual { keys, text, equal } => {
+                let (keys, texts) = (self.of(*keys).keyed(), self.of(*text).symbols());
+                match self.plan.step(*text).shape {
+                    Shape::One => keys.compare_with(texts, *equal).into(),
+                    Shape::Episodes | Shape::Timesteps => keys.compare(segments, texts, *equal).into(),
+                }
+            }
+            Kernel::Window(comparison, moments) => segments.window(*comparison, self.of(*moments).ints()).into(),
+            Kernel::Within(windows) => self.within(windows),
+            Kernel::Search { aggregate, condition, within } => self.search(*aggregate, *condition, *within),
+            Kernel::NullWhereAbsent { values, moments } => {
+                let absent = boolean::is_null(&segments.rows_at(self.of(*moments).ints()))?;
+                Vector::Array(nullif(self.of(*values).array(), &absent)?)
+            }
+        })
     }
 
     fn column(&mut self, name: &str, shape: Shape) -> Result<Vector, EngineError> {
-        let timesteps = shape == Shape::Timesteps;
-        if timesteps && let Some(texts) = self.batch.texts.iter().find(|texts| texts.name == name) {
-            return Ok(self.symbols.of_texts(texts));
+        let (texts, table) = match shape {
+            Shape::Timesteps => (self.batch.texts, self.batch.steps),
+            Shape::Episodes | Shape::One => (&[][..], self.batch.episodes),
+        };
+        if let Some(coded) = Coded::of(texts, table, name) {
+            return Ok(Vector::Keyed(Arc::new(self.symbols.of_coded(coded))));
         }
-        let table = if timesteps { self.batch.steps } else { self.batch.episodes };
         let column = table.column_by_name(name).ok_or_else(|| EngineError::MissingColumn(name.to_owned()))?;
         match column.data_type() {
             DataType::Boolean | DataType::Int64 => Ok(Vector::Array(column.clone())),
             DataType::Float64 => Ok(numbers(column.clone(), Type::Float)),
-            DataType::Dictionary(key, value) if **key == DataType::Int32 && **value == DataType::Utf8 => {
-                Ok(self.symbols.of_column(column.as_dictionary()))
-            }
             other => Err(EngineError::ColumnType { column: name.to_owned(), found: other.to_string() }),
         }
     }
@@ -224,61 +228,52 @@ impl Evaluation<'_> {
         })
     }
 
-    fn at(&self, values: StepId, moments: StepId, ty: Type) -> Vector {
-        let (segments, values, moments) = (self.batch.segments, self.of(values), self.of(moments).ints());
-        match (values, ty) {
-            (Vector::Keyed(keyed), _) => keyed.at(segments, moments).into(),
-            (values, Type::Bool) => segments.bools_at(values.bools(), moments).into(),
-            (values, Type::Int) => segments.at(values.ints(), moments).into(),
-            (values, Type::Float) => segments.at(values.floats(), moments).into(),
-            (values, Type::Text) => segments.at(values.symbols(), moments).into(),
-        }
-    }
-
-    fn elementwise(&self, id: StepId, kernel: &Kernel, ty: Type) -> Result<Vector, ArrowError> {
+    fn operation(&self, id: StepId, op: &Op<StepId>, ty: Type) -> Result<Vector, ArrowError> {
         let segments = self.batch.segments;
         let bools = |id: StepId| self.of(id).bools();
-        let matches = |symbol| self.plan.patterns[&id].is_match(self.symbols.text(symbol));
-        Ok(match kernel {
-            Kernel::Symbols(keys) => self.of(*keys).keyed().symbols().into(),
-            Kernel::KeysEqualText { keys, text, equal } => {
-                self.of(*keys).keyed().compare_with(self.of(*text).symbols(), *equal).into()
+        Ok(match op {
+            Op::Time => segments.times().into(),
+            Op::Length => segments.lengths().into(),
+            Op::Spread(x) => self.spread(*x, ty),
+            Op::Not(x) => boolean::not(bools(*x))?.into(),
+            Op::And(x, y) => boolean::and_kleene(bools(*x), bools(*y))?.into(),
+            Op::Or(x, y) => boolean::or_kleene(bools(*x), bools(*y))?.into(),
+            Op::Compare(comparison, x, y) => compare(*comparison, &*self.operand(*x), &*self.operand(*y))?.into(),
+            Op::Distinct(x, y) => cmp::distinct(&*self.operand(*x), &*self.operand(*y))?.into(),
+            Op::IsNull(x) => boolean::is_null(self.of(*x).validity())?.into(),
+            Op::IsTrue(x) => BooleanArray::new(truths(bools(*x)), None).into(),
+            Op::IsFalse(x) => BooleanArray::new(truths(&boolean::not(bools(*x))?), None).into(),
+            Op::Arithmetic(op @ (Arithmetic::Quotient | Arithmetic::Remainder), x, y) => {
+                divide(*op, self.of(*x).ints(), self.of(*y).ints())?.into()
             }
-            Kernel::KeysEqualEpisode { keys, texts, equal } => {
-                self.of(*keys).keyed().compare(segments, self.of(*texts).symbols(), *equal).into()
+            Op::Arithmetic(op, x, y) => numbers(arithmetic(*op, &*self.operand(*x), &*self.operand(*y))?, ty),
+            Op::Negate(x) => numbers(numeric::neg(self.of(*x).array())?, ty),
+            Op::Coalesce(values) => coalesce(&values.iter().map(|id| self.of(*id)).collect::<Vec<_>>(), ty)?,
+            Op::Matches(x, _) => {
+                let matches = |symbol| self.plan.patterns[&id].is_match(self.symbols.text(symbol));
+                match self.of(*x) {
+                    Vector::Keyed(keyed) => keyed.test(matches).into(),
+                    texts => test_symbols(texts.symbols(), matches).into(),
+                }
             }
-            Kernel::CompareTexts(comparison, x, y) => {
-                let ranks = self.symbols.ranks();
-                let ranked = |id: StepId| -> UInt32Array {
-                    self.of(id).symbols().unary(|symbol| ranks.get(symbol as usize).copied().unwrap_or(0))
-                };
-                let (left, right) = (ranked(*x), ranked(*y));
-                let operand = |id: StepId, array| Operand { array, is_one: self.plan.step(id).shape == Shape::One };
-                compare(*comparison, &operand(*x, &left), &operand(*y, &right))?.into()
+            Op::IntFromBool(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Int64)?),
+            Op::FloatFromInt(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Float64)?),
+            Op::Scale(x, decimals) => scale(self.of(*x).floats(), *decimals)?.into(),
+            Op::Aggregate(aggregate, x) => self.fold(*aggregate, *x)?,
+            Op::At(values, moments) => {
+                let rows = segments.rows_at(self.of(*moments).ints());
+                match self.of(*values) {
+                    Vector::Keyed(keyed) => keyed.at(&rows)?.into(),
+                    values => Vector::Array(take(values.array(), &rows, None)?),
+                }
             }
-            Kernel::KeysMatch(keys, _) => self.of(*keys).keyed().test(matches).into(),
-            Kernel::SymbolsMatch(symbols, _) => test_symbols(self.of(*symbols).symbols(), matches).into(),
-            Kernel::Not(x) => boolean::not(bools(*x))?.into(),
-            Kernel::And(x, y) => boolean::and_kleene(bools(*x), bools(*y))?.into(),
-            Kernel::Or(x, y) => boolean::or_kleene(bools(*x), bools(*y))?.into(),
-            Kernel::Compare(comparison, x, y) => compare(*comparison, &self.operand(*x), &self.operand(*y))?.into(),
-            Kernel::Window(comparison, moments) => segments.window(*comparison, self.of(*moments).ints()).into(),
-            Kernel::Distinct(x, y) => cmp::distinct(&self.operand(*x), &self.operand(*y))?.into(),
-            Kernel::IsNull(x) => boolean::is_null(self.of(*x).validity())?.into(),
-            Kernel::IsTrue(x) => BooleanArray::new(truths(bools(*x)), None).into(),
-            Kernel::IsFalse(x) => BooleanArray::new(truths(&boolean::not(bools(*x))?), None).into(),
-            Kernel::Arithmetic(op, x, y) => numbers(arithmetic(*op, &self.operand(*x), &self.operand(*y))?, ty),
-            Kernel::Divide(op, x, y) => divide(*op, self.of(*x).ints(), self.of(*y).ints())?.into(),
-            Kernel::Negate(x) => numbers(numeric::neg(self.of(*x).array())?, ty),
-            Kernel::Case { branches, otherwise } => {
+            Op::Lag(x) => Vector::Array(nullif(&shift(self.of(*x).array(), 1)?, &segments.first_rows())?),
+            Op::Case { branches, otherwise: Some(otherwise) } => {
                 let branches: Vec<_> = branches.iter().map(|(when, then)| (self.of(*when), self.of(*then))).collect();
                 case(&branches, self.of(*otherwise), ty)
             }
-            Kernel::Coalesce(values) => coalesce(&values.iter().map(|id| self.of(*id)).collect::<Vec<_>>(), ty)?,
-            Kernel::IntFromBool(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Int64)?),
-            Kernel::FloatFromInt(x) => Vector::Array(cast(self.of(*x).array(), &DataType::Float64)?),
-            Kernel::Scale(x, decimals) => scale(self.of(*x).floats(), *decimals)?.into(),
-            _ => unreachable!("`step` evaluates the other kernels"),
+            Op::Case { otherwise: None, .. } => unreachable!("the physical plan gives each case a last value"),
+            Op::Column(_) | Op::Constant(_) => unreachable!("`step` reads these"),
         })
     }
 }

@@ -6,7 +6,9 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, ArrowPrimitiveType, BooleanArray, Int64Array, PrimitiveArray, UInt32Array};
+use arrow::array::{
+    Array, ArrayRef, ArrowPrimitiveType, BooleanArray, Int64Array, PrimitiveArray, UInt32Array, UInt64Array,
+};
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::Int64Type;
 use arrow::error::ArrowError;
@@ -158,10 +160,6 @@ impl<'a> Segments<'a> {
         BooleanArray::new(self.each().map(holds).collect(), None)
     }
 
-    pub(crate) fn exist(self, moments: &Int64Array) -> BooleanBuffer {
-        self.rows_at(moments).map(|row| row.is_some()).collect()
-    }
-
     /// A fold of each episode's non-null values; null without any.
     pub(crate) fn fold<T: ArrowPrimitiveType>(
         self,
@@ -190,26 +188,13 @@ impl<'a> Segments<'a> {
         self.each().map(sum).collect()
     }
 
-    /// The rows of the requested timesteps; `None` if there is no such step.
-    fn rows_at(self, moments: &Int64Array) -> impl Iterator<Item = Option<usize>> {
-        self.each().zip(moments.iter()).map(|((start, length), moment)| {
+    /// The row of the requested timestep of each episode; null if there is no such step.
+    pub(crate) fn rows_at(self, moments: &Int64Array) -> UInt64Array {
+        let row = |((start, length), moment): ((usize, usize), Option<i64>)| {
             let moment = usize::try_from(moment?).ok()?;
-            (1..=length).contains(&moment).then(|| start + moment - 1)
-        })
-    }
-
-    pub(crate) fn at<T: ArrowPrimitiveType>(
-        self,
-        values: &PrimitiveArray<T>,
-        moments: &Int64Array,
-    ) -> PrimitiveArray<T> {
-        let value = |row: Option<usize>| row.filter(|&row| values.is_valid(row)).map(|row| values.value(row));
-        optional(self.rows_at(moments).map(value))
-    }
-
-    pub(crate) fn bools_at(self, values: &BooleanArray, moments: &Int64Array) -> BooleanArray {
-        let value = |row: Option<usize>| row.filter(|&row| values.is_valid(row)).map(|row| values.value(row));
-        self.rows_at(moments).map(value).collect()
+            (1..=length).contains(&moment).then(|| (start + moment - 1) as u64)
+        };
+        self.each().zip(moments.iter()).map(row).collect()
     }
 
     /// The 1-based timesteps of one episode where a predicate holds.

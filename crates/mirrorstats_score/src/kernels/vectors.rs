@@ -5,11 +5,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use arrow::array::{
-    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, DictionaryArray, Float64Array, Int32Array,
-    Int64Array, PrimitiveArray, StringArray, UInt8Array, UInt32Array,
+    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Float64Array, Int32Array, Int64Array,
+    PrimitiveArray, RecordBatch, StringArray, UInt8Array, UInt32Array, UInt64Array,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
-use arrow::datatypes::{ArrowNativeType, Float64Type, Int32Type, Int64Type, UInt32Type};
+use arrow::compute::take;
+use arrow::datatypes::{ArrowNativeType, Float64Type, Int32Type, Int64Type, UInt8Type, UInt32Type};
+use arrow::error::ArrowError;
 
 use crate::kernels::segments::{Segments, Stretch};
 use mirrorstats_metric::columns::Type;
@@ -99,6 +101,30 @@ pub(crate) struct Keyed {
     symbols: Vec<u32>,
 }
 
+/// A text column of a batch: a key per row, and the text of each key, which several keys may share.
+pub(crate) struct Coded<'a> {
+    keys: Keys,
+    pub(crate) texts: &'a StringArray,
+}
+
+impl<'a> Coded<'a> {
+    /// The text column of this name; `None` without one.
+    pub(crate) fn of(texts: &'a [Texts], columns: &'a RecordBatch, name: &str) -> Option<Self> {
+        if let Some(texts) = texts.iter().find(|texts| texts.name == name) {
+            return Some(Self { keys: Keys::Narrow(texts.keys.clone()), texts: &texts.texts });
+        }
+        let column = columns.column_by_name(name)?.as_dictionary_opt::<Int32Type>()?;
+        Some(Self { keys: Keys::Wide(column.keys().clone()), texts: column.values().as_string_opt()? })
+    }
+
+    pub(crate) fn code(&self, row: usize) -> Option<usize> {
+        match &self.keys {
+            Keys::Narrow(keys) => keys.is_valid(row).then(|| keys.value(row).into()),
+            Keys::Wide(keys) => keys.is_valid(row).then(|| usize::try_from(keys.value(row)).ok())?,
+        }
+    }
+}
+
 /// The keys of rows, as bytes if they fit.
 #[derive(Debug)]
 enum Keys {
@@ -123,11 +149,13 @@ impl Keyed {
         }
     }
 
-    pub(crate) fn at(&self, segments: Segments<'_>, moments: &Int64Array) -> UInt32Array {
-        match &self.keys {
-            Keys::Narrow(keys) => self.symbols_of(&segments.at(keys, moments)),
-            Keys::Wide(keys) => self.symbols_of(&segments.at(keys, moments)),
-        }
+    /// The symbols of some rows, null for a null row.
+    pub(crate) fn at(&self, rows: &UInt64Array) -> Result<UInt32Array, ArrowError> {
+        let keys = take(self.keys.array(), rows, None)?;
+        Ok(match &self.keys {
+            Keys::Narrow(_) => self.symbols_of(keys.as_primitive::<UInt8Type>()),
+            Keys::Wide(_) => self.symbols_of(keys.as_primitive::<Int32Type>()),
+        })
     }
 
     fn symbols_of<K: ArrowPrimitiveType>(&self, keys: &PrimitiveArray<K>) -> UInt32Array {
@@ -242,15 +270,7 @@ impl Symbols {
         ranks
     }
 
-    pub(crate) fn of_texts(&mut self, texts: &Texts) -> Vector {
-        Vector::Keyed(Arc::new(self.of_keys(Keys::Narrow(texts.keys.clone()), &texts.texts)))
-    }
-
-    pub(crate) fn of_column(&mut self, column: &DictionaryArray<Int32Type>) -> Vector {
-        Vector::Keyed(Arc::new(self.of_keys(Keys::Wide(column.keys().clone()), column.values().as_string())))
-    }
-
-    fn of_keys(&mut self, keys: Keys, texts: &StringArray) -> Keyed {
+    pub(crate) fn of_coded(&mut self, Coded { keys, texts }: Coded<'_>) -> Keyed {
         let (mut symbols, mut places) = (Vec::new(), HashMap::new());
         let mut key = |text: &str| {
             let symbol = self.intern(text);
@@ -274,21 +294,29 @@ impl Symbols {
 
 #[cfg(test)]
 mod tests {
-    use arrow::array::{Array, BooleanArray, DictionaryArray, Int32Array, StringArray, UInt8Array};
+    use std::sync::Arc;
+
+    use arrow::array::{
+        Array, ArrayRef, BooleanArray, DictionaryArray, Int32Array, RecordBatch, StringArray, UInt8Array,
+    };
     use arrow::datatypes::Int32Type;
     use proptest::collection::vec;
     use proptest::option;
     use proptest::prelude::*;
 
-    use super::{Symbols, Texts, Vector};
+    use super::{Coded, Symbols, Texts, Vector};
     use crate::kernels::segments::Segments;
 
     fn both(symbols: &mut Symbols, known: &[&str], keys: &[Option<u8>]) -> [Vector; 2] {
         let texts = StringArray::from(known.to_vec());
         let wide: Int32Array = keys.iter().map(|key| key.map(i32::from)).collect();
-        let wide = DictionaryArray::<Int32Type>::new(wide, std::sync::Arc::new(texts.clone()));
+        let wide: ArrayRef = Arc::new(DictionaryArray::<Int32Type>::new(wide, Arc::new(texts.clone())));
+        let wide = RecordBatch::try_from_iter([("a", wide)]).unwrap();
         let narrow = Texts { name: "a".into(), keys: UInt8Array::from(keys.to_vec()), texts };
-        [symbols.of_texts(&narrow), symbols.of_column(&wide)]
+        [&[narrow][..], &[]].map(|texts| {
+            let coded = Coded::of(texts, &wide, "a").unwrap();
+            Vector::Keyed(Arc::new(symbols.of_coded(coded)))
+        })
     }
 
     fn truths(found: &BooleanArray) -> Vec<Option<bool>> {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::window::{beside_its_episode, computes_after_lookup, is_leaf, split, window};
+use super::window::{beside_its_episode, computes_after_lookup, is_leaf, split};
 use super::{Kernel, PhysicalPlan, Shape, StepId};
 use mirrorstats_metric::columns::{Level, Type};
 use mirrorstats_metric::logical_plan::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan};
@@ -53,7 +53,7 @@ impl<'a> Lowering<'a> {
 
     fn at(&mut self, values: StepId, moments: StepId) -> StepId {
         let ty = self.physical.step(values).ty;
-        self.physical.push(Kernel::At { values, moments }, ty, Shape::Episodes)
+        self.physical.push(Kernel::Op(Op::At(values, moments)), ty, Shape::Episodes)
     }
 
     fn operation(&mut self, id: NodeId, at: Option<StepId>) -> StepId {
@@ -71,9 +71,8 @@ impl<'a> Lowering<'a> {
             (Op::Compare(comparison, x, y), _) => self.compare(&node.op, *comparison, (*x, *y), at),
             (Op::Aggregate(aggregate, x), _) => self.aggregate(*aggregate, *x),
             (Op::At(x, moment), _) => return self.lookup(*x, *moment),
-            (Op::Lag(x), _) => Kernel::Lag(self.full(*x, Shape::Timesteps, None)),
             (Op::Case { branches, otherwise }, _) => self.case(branches, *otherwise, node.ty, shape, at),
-            (op, _) => self.elementwise(op, shape, at),
+            (op, _) => Kernel::Op(self.with_steps(op, shape, at)),
         };
         let step = self.physical.push(kernel, node.ty, shape);
         if let Some(metric) = self.metrics.get(&id) {
@@ -82,32 +81,16 @@ impl<'a> Lowering<'a> {
         step
     }
 
-    fn elementwise(&mut self, op: &Op, shape: Shape, at: Option<StepId>) -> Kernel {
+    /// The same operation of steps, with operands in the form that its kernel takes.
+    fn with_steps(&mut self, op: &Op, shape: Shape, at: Option<StepId>) -> Op<StepId> {
         match op {
-            Op::Column(name) => Kernel::Column(name.clone()),
-            Op::Constant(constant) => Kernel::Constant(constant.clone()),
-            Op::Time => Kernel::Times,
-            Op::Length => Kernel::Lengths,
-            Op::Not(x) => Kernel::Not(self.node(*x, at)),
-            Op::And(x, y) => Kernel::And(self.full(*x, shape, at), self.full(*y, shape, at)),
-            Op::Or(x, y) => Kernel::Or(self.full(*x, shape, at), self.full(*y, shape, at)),
-            Op::Distinct(x, y) => Kernel::Distinct(self.plain(*x, at), self.plain(*y, at)),
-            Op::IsNull(x) => Kernel::IsNull(self.node(*x, at)),
-            Op::IsTrue(x) => Kernel::IsTrue(self.node(*x, at)),
-            Op::IsFalse(x) => Kernel::IsFalse(self.node(*x, at)),
-            Op::Arithmetic(op @ (Arithmetic::Quotient | Arithmetic::Remainder), x, y) => {
-                Kernel::Divide(*op, self.full(*x, shape, at), self.full(*y, shape, at))
-            }
-            Op::Arithmetic(op, x, y) => Kernel::Arithmetic(*op, self.node(*x, at), self.node(*y, at)),
-            Op::Negate(x) => Kernel::Negate(self.node(*x, at)),
-            Op::Coalesce(values) => Kernel::Coalesce(values.iter().map(|id| self.full(*id, shape, at)).collect()),
-            Op::Matches(x, pattern) => self.matches(*x, pattern, at),
-            Op::IntFromBool(x) => Kernel::IntFromBool(self.node(*x, at)),
-            Op::FloatFromInt(x) => Kernel::FloatFromInt(self.node(*x, at)),
-            Op::Scale(x, decimals) => Kernel::Scale(self.node(*x, at), *decimals),
-            Op::Spread(_) | Op::Compare(..) | Op::Case { .. } | Op::Aggregate(..) | Op::At(..) | Op::Lag(_) => {
-                unreachable!("these have functions of their own")
-            }
+            Op::Lag(_) => op.map(|x| self.full(x, Shape::Timesteps, None)),
+            Op::And(..)
+            | Op::Or(..)
+            | Op::Coalesce(_)
+            | Op::Arithmetic(Arithmetic::Quotient | Arithmetic::Remainder, ..) => op.map(|x| self.full(x, shape, at)),
+            Op::Distinct(..) => op.map(|x| self.plain(x, at)),
+            _ => op.map(|x| self.node(x, at)),
         }
     }
 
@@ -123,39 +106,35 @@ impl<'a> Lowering<'a> {
     fn full(&mut self, id: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
         let step = self.plain(id, at);
         let (ty, from) = (self.physical.step(step).ty, self.physical.step(step).shape);
-        if from == Shape::One { self.physical.push(Kernel::Repeat(step), ty, shape) } else { step }
+        if from == Shape::One { self.physical.push(Kernel::Op(Op::Spread(step)), ty, shape) } else { step }
     }
 
     fn gives_keys(&self, step: StepId) -> bool {
         let step = self.physical.step(step);
-        step.ty == Type::Text && matches!(step.kernel, Kernel::Column(_))
+        step.ty == Type::Text && matches!(step.kernel, Kernel::Op(Op::Column(_)))
     }
 
     fn spread(&mut self, x: NodeId, shape: Shape, at: Option<StepId>) -> StepId {
         let values = self.plain(x, at);
-        let ty = self.physical.step(values).ty;
-        match self.physical.step(values).shape {
-            Shape::One => self.physical.push(Kernel::Repeat(values), ty, shape),
-            from if from == shape => values,
-            _ => self.physical.push(Kernel::Spread(values), ty, shape),
-        }
+        let (ty, from) = (self.physical.step(values).ty, self.physical.step(values).shape);
+        if from == shape { values } else { self.physical.push(Kernel::Op(Op::Spread(values)), ty, shape) }
     }
 
     fn compare(&mut self, op: &Op, comparison: Comparison, (x, y): (NodeId, NodeId), at: Option<StepId>) -> Kernel {
         let plan = self.plan;
         if at.is_none() {
-            if let Some((comparison, moment)) = window(plan, op) {
+            if let Some((comparison, moment)) = plan.window(op) {
                 return Kernel::Window(comparison, self.full(moment, Shape::Episodes, None));
             }
             if let Some((column, text)) = beside_its_episode(plan, op) {
-                let (keys, texts) = (self.node(column, None), self.full(text, Shape::Episodes, None));
-                return Kernel::KeysEqualEpisode { keys, texts, equal: comparison == Comparison::Equal };
+                let (keys, text) = (self.node(column, None), self.full(text, Shape::Episodes, None));
+                return Kernel::KeysEqual { keys, text, equal: comparison == Comparison::Equal };
             }
         }
         if plan.node(x).ty == Type::Text {
             self.compare_texts(comparison, x, y, at)
         } else {
-            Kernel::Compare(comparison, self.node(x, at), self.node(y, at))
+            Kernel::Op(Op::Compare(comparison, self.node(x, at), self.node(y, at)))
         }
     }
 
@@ -167,18 +146,9 @@ impl<'a> Lowering<'a> {
         let (left, right) = (self.node(x, at), self.node(y, at));
         let is_constant = |step: StepId| self.physical.step(step).shape == Shape::One;
         match (self.gives_keys(left), self.gives_keys(right)) {
-            (true, _) if is_constant(right) => Kernel::KeysEqualText { keys: left, text: right, equal },
-            (_, true) if is_constant(left) => Kernel::KeysEqualText { keys: right, text: left, equal },
-            _ => Kernel::Compare(comparison, self.plain(x, at), self.plain(y, at)),
-        }
-    }
-
-    fn matches(&mut self, x: NodeId, pattern: &str, at: Option<StepId>) -> Kernel {
-        let texts = self.node(x, at);
-        if self.gives_keys(texts) {
-            Kernel::KeysMatch(texts, pattern.to_owned())
-        } else {
-            Kernel::SymbolsMatch(texts, pattern.to_owned())
+            (true, _) if is_constant(right) => Kernel::KeysEqual { keys: left, text: right, equal },
+            (_, true) if is_constant(left) => Kernel::KeysEqual { keys: right, text: left, equal },
+            _ => Kernel::Op(Op::Compare(comparison, self.plain(x, at), self.plain(y, at))),
         }
     }
 
@@ -195,15 +165,15 @@ impl<'a> Lowering<'a> {
         let otherwise = if let Some(id) = otherwise {
             self.full(id, shape, at)
         } else {
-            let null = self.physical.push(Kernel::Constant(Constant::Null), ty, Shape::One);
-            self.physical.push(Kernel::Repeat(null), ty, shape)
+            let null = self.physical.push(Kernel::Op(Op::Constant(Constant::Null)), ty, Shape::One);
+            self.physical.push(Kernel::Op(Op::Spread(null)), ty, shape)
         };
-        Kernel::Case { branches, otherwise }
+        Kernel::Op(Op::Case { branches, otherwise: Some(otherwise) })
     }
 
     fn aggregate(&mut self, aggregate: Aggregate, x: NodeId) -> Kernel {
         if !aggregate.searches() {
-            return Kernel::Fold(aggregate, self.full(x, Shape::Timesteps, None));
+            return Kernel::Op(Op::Aggregate(aggregate, self.full(x, Shape::Timesteps, None)));
         }
         let (rest, windows) = split(self.plan, x);
         let windows: Vec<_> = windows

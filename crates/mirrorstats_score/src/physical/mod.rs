@@ -15,7 +15,7 @@ use regex::Regex;
 
 use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_metric::columns::Type;
-use mirrorstats_metric::logical_plan::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Plan};
+use mirrorstats_metric::logical_plan::plan::{Aggregate, Comparison, NodeId, Op, Plan};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StepId(pub(super) usize);
@@ -34,121 +34,39 @@ pub struct Step {
     pub shape: Shape,
 }
 
-/// The kernels. One that is named like an operation of [`mirrorstats_metric::logical_plan::plan::Op`] computes the same. By default a null operand
-/// gives null, and operands have the shape of the result or [`Shape::One`]. No operand of `And`, `Or`, `Divide`,
-/// `Coalesce` and `Lag` is a constant. Texts are symbols (integers that represent texts), except where a kernel takes
-/// keys.
+/// The kernels. By default a null operand gives null, and operands have the shape of the result or [`Shape::One`].
+/// Texts are symbols (integers that represent texts), except where a kernel takes keys.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Kernel {
-    /// A column of the batch; a text column gives keys into its dictionary.
-    Column(String),
-    Constant(Constant),
-    Times,
-    Lengths,
-    Repeat(StepId),
-    Spread(StepId),
+    /// The operation of the logical plan, on vectors. A text column gives keys into its dictionary; `IsNull`, `Matches`
+    /// and `At` take keys too. `Compare` of symbols is for equality only. No operand of `And`, `Or`, a division,
+    /// `Coalesce` and `Lag` is a constant, nor is a condition or the last value of `Case`, which always has one.
+    Op(Op<StepId>),
+    /// The symbols of keys.
     Symbols(StepId),
-    Not(StepId),
-    And(StepId, StepId),
-    Or(StepId, StepId),
-    /// A comparison by value; of symbols, for equality only.
-    Compare(Comparison, StepId, StepId),
     /// A comparison of symbols by the order of their texts.
     CompareTexts(Comparison, StepId, StepId),
-    /// True where keys refer to a constant text, or where they do not.
-    KeysEqualText {
-        keys: StepId,
-        text: StepId,
-        equal: bool,
-    },
-    /// True where the keys of a timestep refer to the text of their episode, or where they do not.
-    KeysEqualEpisode {
-        keys: StepId,
-        texts: StepId,
-        equal: bool,
-    },
+    /// True where keys refer to a constant text or to the text of their episode, or where they do not.
+    KeysEqual { keys: StepId, text: StepId, equal: bool },
     /// True where the timestep satisfies the comparison with a moment of its episode; timesteps are not materialised.
     Window(Comparison, StepId),
-    Distinct(StepId, StepId),
-    /// Takes keys.
-    IsNull(StepId),
-    IsTrue(StepId),
-    IsFalse(StepId),
-    Arithmetic(Arithmetic, StepId, StepId),
-    /// Quotient or remainder of two integers, null where the divisor is 0.
-    Divide(Arithmetic, StepId, StepId),
-    Negate(StepId),
-    /// Values of branches may be constants.
-    Case {
-        branches: Vec<(StepId, StepId)>,
-        otherwise: StepId,
-    },
-    Coalesce(Vec<StepId>),
-    KeysMatch(StepId, String),
-    SymbolsMatch(StepId, String),
-    IntFromBool(StepId),
-    FloatFromInt(StepId),
-    Scale(StepId, u8),
     /// The rows of each episode that are in all these windows, which compare the timestep with moments; empty if a
     /// moment is null. Gives ranges of rows, not values.
     Within(Vec<(Comparison, StepId)>),
     /// `first`, `last`, `any` or `count` of a condition, over all rows or over the rows of a `Within`.
-    Search {
-        aggregate: Aggregate,
-        condition: StepId,
-        within: Option<StepId>,
-    },
-    /// `all`, `min`, `max` or `sum` of a value per timestep.
-    Fold(Aggregate, StepId),
-    /// Takes values or keys.
-    At {
-        values: StepId,
-        moments: StepId,
-    },
-    /// Takes values.
-    Lag(StepId),
+    Search { aggregate: Aggregate, condition: StepId, within: Option<StepId> },
     /// Values per episode, null where the episode has no such timestep.
-    NullWhereAbsent {
-        values: StepId,
-        moments: StepId,
-    },
+    NullWhereAbsent { values: StepId, moments: StepId },
 }
 
 impl Kernel {
     pub fn operands(&self) -> Vec<StepId> {
         match self {
-            Self::Column(_) | Self::Constant(_) | Self::Times | Self::Lengths => vec![],
-            Self::Repeat(x)
-            | Self::Spread(x)
-            | Self::Symbols(x)
-            | Self::Not(x)
-            | Self::Window(_, x)
-            | Self::IsNull(x)
-            | Self::IsTrue(x)
-            | Self::IsFalse(x)
-            | Self::Negate(x)
-            | Self::KeysMatch(x, _)
-            | Self::SymbolsMatch(x, _)
-            | Self::IntFromBool(x)
-            | Self::FloatFromInt(x)
-            | Self::Scale(x, _)
-            | Self::Fold(_, x)
-            | Self::Lag(x) => vec![*x],
-            Self::And(x, y)
-            | Self::Or(x, y)
-            | Self::Compare(_, x, y)
-            | Self::CompareTexts(_, x, y)
-            | Self::KeysEqualText { keys: x, text: y, .. }
-            | Self::KeysEqualEpisode { keys: x, texts: y, .. }
-            | Self::Distinct(x, y)
-            | Self::Arithmetic(_, x, y)
-            | Self::Divide(_, x, y)
-            | Self::At { values: x, moments: y }
+            Self::Op(op) => op.operands(),
+            Self::Symbols(x) | Self::Window(_, x) => vec![*x],
+            Self::CompareTexts(_, x, y)
+            | Self::KeysEqual { keys: x, text: y, .. }
             | Self::NullWhereAbsent { values: x, moments: y } => vec![*x, *y],
-            Self::Case { branches, otherwise } => {
-                branches.iter().flat_map(|(when, then)| [*when, *then]).chain([*otherwise]).collect()
-            }
-            Self::Coalesce(values) => values.clone(),
             Self::Within(windows) => windows.iter().map(|(_, moments)| *moments).collect(),
             Self::Search { condition, within, .. } => std::iter::once(*condition).chain(*within).collect(),
         }
@@ -212,7 +130,7 @@ impl PhysicalPlan {
     pub fn columns(&self) -> (Vec<String>, Vec<String>) {
         let (mut timesteps, mut episodes) = (Vec::new(), Vec::new());
         for step in &self.steps {
-            if let Kernel::Column(name) = &step.kernel {
+            if let Kernel::Op(Op::Column(name)) = &step.kernel {
                 let columns = if step.shape == Shape::Timesteps { &mut timesteps } else { &mut episodes };
                 columns.push(name.clone());
             }
@@ -226,7 +144,7 @@ impl PhysicalPlan {
             return *known;
         }
         let id = StepId(self.steps.len());
-        if let Kernel::KeysMatch(_, pattern) | Kernel::SymbolsMatch(_, pattern) = &step.kernel {
+        if let Kernel::Op(Op::Matches(_, pattern)) = &step.kernel {
             let pattern = Regex::new(pattern).expect("the binder has compiled this pattern");
             self.patterns.insert(id, pattern);
         }

@@ -5,18 +5,6 @@ use std::collections::BTreeSet;
 use mirrorstats_metric::columns::{Level, Type};
 use mirrorstats_metric::logical_plan::plan::{Comparison, NodeId, Op, Plan};
 
-/// A comparison of `t` with a moment of the episode, which needs no materialised timesteps.
-pub(super) fn window(plan: &Plan, op: &Op) -> Option<(Comparison, NodeId)> {
-    match op {
-        Op::Compare(comparison, left, right) if plan.node(*left).op == Op::Time => match &plan.node(*right).op {
-            Op::Spread(moment) => Some((*comparison, *moment)),
-            Op::Constant(_) => Some((*comparison, *right)),
-            _ => None,
-        },
-        _ => None,
-    }
-}
-
 pub(super) fn beside_its_episode(plan: &Plan, op: &Op) -> Option<(NodeId, NodeId)> {
     let Op::Compare(Comparison::Equal | Comparison::NotEqual, x, y) = op else { return None };
     let pair = |column: NodeId, text: NodeId| match (&plan.node(column).op, &plan.node(text).op) {
@@ -31,7 +19,7 @@ pub(super) fn beside_its_episode(plan: &Plan, op: &Op) -> Option<(NodeId, NodeId
 /// how these aggregates treat null.
 pub(super) fn split(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison, NodeId)>) {
     let part =
-        |id: NodeId| window(plan, &plan.node(id).op).filter(|(comparison, _)| *comparison != Comparison::NotEqual);
+        |id: NodeId| plan.window(&plan.node(id).op).filter(|(comparison, _)| *comparison != Comparison::NotEqual);
     let (mut rest, mut windows) = (condition, Vec::new());
     while let Op::And(x, y) = plan.node(rest).op {
         match (part(x), part(y)) {

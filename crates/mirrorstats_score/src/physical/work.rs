@@ -3,6 +3,7 @@
 use super::{Kernel, PhysicalPlan, Shape, Step};
 use mirrorstats_exact::budget::{Exceeded, Limit};
 use mirrorstats_metric::columns::Type;
+use mirrorstats_metric::logical_plan::plan::Op;
 
 /// The bytes that the values of all steps take for one batch, which are kept until the batch is scored.
 const LARGEST_BATCH: Limit = Limit::new("bytes of values of the definitions for an episode", 128 << 20);
@@ -34,7 +35,7 @@ impl PhysicalPlan {
         let bits = |step: &Step| if step.shape == Shape::Timesteps { bits_of(step) } else { 0 };
         let per_row = self.steps.iter().fold(0_u64, |sum, step| {
             // `case` reads a branch value by value, whatever its type.
-            let least = if matches!(step.kernel, Kernel::Case { .. } | Kernel::Coalesce(_)) {
+            let least = if matches!(step.kernel, Kernel::Op(Op::Case { .. } | Op::Coalesce(_))) {
                 bits(step).min(64) * 8
             } else {
                 0

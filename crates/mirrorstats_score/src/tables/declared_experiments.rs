@@ -10,7 +10,7 @@ use indexmap::IndexMap;
 use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::ratio::Ratio;
-use mirrorstats_metric::catalogs::catalog::{Catalog, Experiment, Kind};
+use mirrorstats_metric::catalogs::catalog::{Catalog, Experiment, Kind, is_share};
 use mirrorstats_trace::footers::declared_experiment::DeclaredExperiment;
 use mirrorstats_trace::read::open::TraceSet;
 
@@ -93,16 +93,8 @@ fn resolved(declared: &DeclaredExperiment, catalog: &Catalog) -> Experiment {
 }
 
 fn no_share(file: &str, name: &str, experiment: &Experiment, catalog: &Catalog) -> Option<DeclarationError> {
-    let chance = experiment.chance.iter();
-    let chance = chance.flat_map(|(metric, level)| {
-        level.iter().flat_map(Chance::levels).map(move |(_, level)| ("chance", metric, level))
-    });
-    let reference = experiment.reference.iter();
-    let reference =
-        reference.flat_map(|(metric, levels)| levels.iter().map(move |level| ("reference", metric, *level)));
-    let is_share = |level: Ratio| (0..=level.denominator()).contains(&level.numerator());
     let is_rate = |metric: &String| catalog.metric.get(metric).is_some_and(|metric| metric.kind == Kind::Rate);
-    let mut wrong = chance.chain(reference).filter(|(_, metric, level)| is_rate(metric) && !is_share(*level));
+    let mut wrong = experiment.levels().filter(|(_, metric, level)| is_rate(metric) && !is_share(*level));
     let (kind, metric, level) = wrong.next()?;
     let (name, metric) = (visible(name), visible(metric));
     Some(DeclarationError {

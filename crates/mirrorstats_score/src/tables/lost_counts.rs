@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::quality::CellKey;
-use crate::tables::table::{CONDITION, EpisodeTable};
-use mirrorstats_trace::schema::{self, Column};
+use crate::tables::table::{CONDITION, EpisodeTable, default_text};
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LostCounts(BTreeMap<CellKey, u64>);
@@ -12,7 +11,7 @@ pub struct LostCounts(BTreeMap<CellKey, u64>);
 impl LostCounts {
     /// The lost episodes of a table: rows that are marked, and episodes that were never recorded.
     pub fn of_table(table: &EpisodeTable) -> Self {
-        let default = schema::column(CONDITION).and_then(Column::default_text).unwrap_or_default();
+        let default = default_text(CONDITION).unwrap_or_default();
         let cell = |experiment: &str, model: &str, condition: Option<&str>| CellKey {
             experiment: experiment.to_owned(),
             model: model.to_owned(),

@@ -44,7 +44,8 @@ use mirrorstats_record::index::RecordingIndex;
 use mirrorstats_record::lock::FolderLock;
 use mirrorstats_record::metadata::Recordings;
 use mirrorstats_record::plan::{Episodes, Experiments, Key, Named, Plan, Shard, Subject};
-use mirrorstats_record::run::{Recording, Settings, Tally};
+use mirrorstats_record::queue::Tally;
+use mirrorstats_record::run::{Recording, Settings};
 use mirrorstats_record::store::Store;
 use mirrorstats_sim::config::WorldConfig;
 

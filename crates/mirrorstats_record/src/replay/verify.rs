@@ -190,11 +190,11 @@ impl TracePlayer<'_> {
         save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<Option<Divergence>, E> {
         let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
-        let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
+        let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode));
         let mut log = log.transpose().map_err(unwritten)?;
         let mut other_frame = None;
         let divergence =
-            again(&self.trace.recipe, &self.trace.recipe.config, episode, |t, world, visibility, step| {
+            again(&self.trace.recipe, &self.trace.recipe.config, episode, i32::MAX, |t, world, visibility, step| {
                 let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
                 let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
                 let recorded = step.extra.frame_digest.as_deref();

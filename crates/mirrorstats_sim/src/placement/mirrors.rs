@@ -224,15 +224,12 @@ impl PaneLayout<'_> {
             Wearer::Own => (0, self.scene.body_color),
             Wearer::Other => (1, self.scene.others.first()?.color),
         };
-        let is_free = |color: Color| color != body;
-        let colors = |is_free: &dyn Fn(Color) -> bool| {
-            let palette = self.scene.experiment.layout.palette.iter().copied();
-            palette.filter(|color| is_free(*color)).collect::<Vec<_>>()
-        };
-        let (free, unused) = (colors(&is_free), colors(&|color| is_free(color) && !before.contains(&color)));
+        let palette = self.scene.experiment.layout.palette.iter().copied();
+        let free: Vec<Color> = palette.filter(|color| *color != body).collect();
+        let unused: Vec<Color> = free.iter().copied().filter(|color| !before.contains(color)).collect();
         let drawn = if unused.is_empty() { &free } else { &unused };
         let color = match mark.color {
-            MarkColor::Named(color) if is_free(color) => color,
+            MarkColor::Named(color) if color != body => color,
             MarkColor::Named(_) | MarkColor::Random if drawn.is_empty() => return None,
             MarkColor::Named(_) | MarkColor::Random => chance.one_of(drawn),
         };

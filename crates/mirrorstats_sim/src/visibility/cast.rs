@@ -1,7 +1,7 @@
 //! Views over the pixels, direct and through each pane, row by row, each part within its bounding rectangle.
 
 use super::super::label_image::Rectangle;
-use super::super::model::{Item, Sight, Stage};
+use super::super::model::{Item, Stage};
 use super::super::world::World;
 use super::shape::{RaySolid, solid};
 use super::view::{RayView, Shown};
@@ -48,9 +48,9 @@ fn pane_code(pane: usize) -> u8 {
 
 impl Pass {
     fn new(view: RayView, stage: &Stage) -> Self {
-        let code = |item: Item| match stage.look {
-            Sight::Direct => Shown::Direct(item).code(),
-            Sight::Through(pane) => Shown::Through(pane, item).code(),
+        let code = |item: Item| match stage.pane {
+            None => Shown::Direct(item).code(),
+            Some(pane) => Shown::Through(pane, item).code(),
         };
         let shown = stage.items.iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
         let candidates = shown.filter_map(|(geom, item)| {

@@ -31,10 +31,10 @@ use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 use mirrorstats_trace::episodes::episode_hash;
 
 pub trait Progress: Sync {
-    fn step(&self, episode: &Key, t: i32, row: &Step);
-    fn episode(&self, key: &Key, id: &str, steps: usize);
-    fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
-    fn lost(&self, id: &str, reason: &str);
+    fn step(&self, _episode: &Key, _t: i32, _row: &Step) {}
+    fn episode(&self, _key: &Key, _id: &str, _steps: usize) {}
+    fn model_changed(&self, _id: &str, _t: i32, _before: &str, _after: &str) {}
+    fn lost(&self, _id: &str, _reason: &str) {}
     /// The view before a decision.
     fn seen(&self, _: &Seen<'_>) {}
 }
@@ -194,13 +194,7 @@ impl Recording<'_> {
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         episode.participant = agent.person().map(|person| person.code().to_owned());
-        let stage = EpisodeStage {
-            config: self.config,
-            eye,
-            looks: self.player.looks(),
-            casts: self.settings.casts,
-            stop: self.stop,
-        };
+        let stage = EpisodeStage { eye, looks: self.player.looks(), casts: self.settings.casts, stop: self.stop };
         if agent.person().is_some_and(|person| person.wants_practice()) {
             self.practise(&stage, agent.as_mut(), key).await?;
         }

@@ -79,6 +79,7 @@ pub struct EpisodeLog {
     out: Writer<Out>,
     channels: BTreeMap<&'static str, u16>,
     sequence: u32,
+    is_read_meanwhile: bool,
 }
 
 type Out = BufWriter<NewFile>;
@@ -89,7 +90,7 @@ impl EpisodeLog {
         let file = NewFile::create(path).map_err(LogError::io("write", path))?;
         let mut out = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
-        let mut log = Self { path: path.to_owned(), out, channels, sequence: 0 };
+        let mut log = Self { path: path.to_owned(), out, channels, sequence: 0, is_read_meanwhile: true };
         // The hash of its rows is not known before its end, which holds it.
         let head = Episode { episode_hash: None, ..head.clone() };
         log.json(topic::EPISODE, time, &EpisodeMessage::Begin(Box::new(head)))?;
@@ -117,7 +118,13 @@ impl EpisodeLog {
 
     pub fn decided(&mut self, time: u64, row: &Decision) -> Result<(), LogError> {
         self.json(topic::DECISION, time, row)?;
-        self.flush()
+        if self.is_read_meanwhile { self.flush() } else { Ok(()) }
+    }
+
+    /// Uses chunks of many steps, which are smaller, for a log that is only read after it has ended.
+    #[must_use]
+    pub fn in_large_chunks(self) -> Self {
+        Self { is_read_meanwhile: false, ..self }
     }
 
     /// Ends the chunk of a step, so that others can read it during the episode.

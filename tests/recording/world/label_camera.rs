@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use mirrorstats_experiment::spec::Look;
 use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_sim::label_image::LabelImage;
-use mirrorstats_sim::model::{EYE_CAMERA, Item, Stage, group};
+use mirrorstats_sim::model::{EYE_CAMERA, Item, Stage};
 use mirrorstats_sim::scene::Scene;
 use mirrorstats_sim::visibility::Shown;
 use mirrorstats_sim::world::World;
@@ -34,7 +35,11 @@ impl LabelCamera {
     pub fn labels(&mut self, world: &World) -> LabelImage {
         let mut stages = match self.painted.take() {
             Some((scene, stages)) if scene == *world.scene() => stages,
-            _ => Stage::all(world.config(), world.scene()).unwrap(),
+            _ => {
+                // Textures and shadows have no labels.
+                let config = WorldConfig { look: Look::default(), ..world.config().clone() };
+                Stage::all(&config, world.scene()).unwrap()
+            }
         };
         world.show_on(&mut stages);
         stages.iter_mut().for_each(paint);
@@ -59,17 +64,13 @@ impl LabelCamera {
     }
 }
 
-/// Gives everything exactly the colour of its label: no light, no shade, no shadows.
+/// Gives everything exactly the colour of its label: no light, no shade.
 fn paint(stage: &mut Stage) {
     let mut model = (*stage.model).clone();
     let head = &mut model.vis_mut().headlight;
     (head.ambient, head.diffuse, head.specular) = ([1.0; 3], [0.0; 3], [0.0; 3]);
     model.light_diffuse_mut().fill([0.0; 3]);
     for (geom, item) in stage.items.iter().enumerate() {
-        // Only shadows are translucent.
-        if model.geom_rgba()[geom][3] < 1.0 {
-            model.geom_group_mut()[geom] = group::HIDDEN;
-        }
         let [red, green] = match *item {
             Item::Pane(pane) => [0, u8::try_from(pane + 1).unwrap()],
             item => [Shown::Direct(item).code(), 0],

@@ -37,6 +37,12 @@ impl Log {
         Ok(Self { place, file: EpisodeLog::create(path, episode, &CENSUS, time(place, 0))? })
     }
 
+    /// Makes the log smaller, if it is not read before its end.
+    #[must_use]
+    pub fn in_large_chunks(self) -> Self {
+        Self { file: self.file.in_large_chunks(), ..self }
+    }
+
     pub fn seen(&mut self, seen: &Seen<'_>) -> Result<(), LogFault> {
         let png = seen.frame.map(|frame| frame.to_png()).transpose()?;
         let snapshot = seen.world.snapshot();

@@ -152,7 +152,7 @@ impl RecordedTrace {
         save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<Option<Divergence>, E> {
         let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
-        let log = outputs.log.as_ref().map(|_| Log::begin(part, episode));
+        let log = outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
         let mut log = log.transpose().map_err(unwritten)?;
         let mut other_frame = None;
         let divergence = again(&self.recipe, &self.recipe.config, episode, i32::MAX, |t, world, visibility, step| {

@@ -28,7 +28,7 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
     let mut player = agent.agent(&task(config, &scene, key));
     let episode = head(config, &scene, key, &Subject::for_model(agent.name()));
     let mut world = World::new(config, scene).unwrap();
-    let stage = EpisodeStage { config, eye, looks: true, casts: true, stop: &AtomicBool::new(false) };
+    let stage = EpisodeStage { eye, looks: true, casts: true, stop: &AtomicBool::new(false) };
     ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
 }
 

@@ -35,11 +35,6 @@ pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
         .create(out)
 }
 
-/// Merges these logs of one episode each into the log at `out`, which is replaced in one step.
-pub fn write(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
-    assemble(out, None, parts, recording, folder_of(out))
-}
-
 /// Merges the log `before`, if any, with these logs of one episode each. The result replaces `out` in one step; it is
 /// written in `scratch`, a folder of the same disk. For an episode in both, `before` counts. The caller must check that
 /// `before` belongs to `recording`.

@@ -28,7 +28,6 @@ use mirrorstats_experiment::Experiment;
 use mirrorstats_sim::camera::{Camera, CameraError};
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_sim::visibility::Visibility;
-use mirrorstats_trace::episodes::episode::Step;
 use mirrorstats_trace::schema::colors::Color;
 
 /// One experiment for a harness, an episode at a time.
@@ -107,7 +106,7 @@ impl Environment {
         let recordings =
             Recordings::new(std::slice::from_ref(&experiment), config, &player, subject.condition.as_deref(), None);
         let store = Store::new(Arc::clone(&folder.lock), subject.clone(), recordings);
-        for (seed, run, repetition) in store.recorded(&experiment)? {
+        for (seed, run, repetition) in store.index.recorded(&experiment)? {
             let key = Key { experiment: experiment.clone(), seed, run, repetition };
             locked(&folder.taken).insert(key.episode_id(&subject));
         }
@@ -226,7 +225,7 @@ impl Environment {
         self.cut_off()?;
         let Shared { store, experiment, .. } = &*self.shared;
         store.assemble(experiment)?;
-        Ok([store.trace(experiment), store.log(experiment)])
+        Ok([store.index.trace(experiment), store.index.log(experiment)])
     }
 }
 
@@ -260,11 +259,6 @@ impl Shared {
 struct CurrentTruth(Mutex<Option<GroundTruth>>);
 
 impl Progress for CurrentTruth {
-    fn step(&self, _: &Key, _: i32, _: &Step) {}
-    fn episode(&self, _: &Key, _: &str, _: usize) {}
-    fn model_changed(&self, _: &str, _: i32, _: &str, _: &str) {}
-    fn lost(&self, _: &str, _: &str) {}
-
     fn seen(&self, seen: &Seen<'_>) {
         *locked(&self.0) = Some(GroundTruth {
             body_color: seen.world.scene().body_color,

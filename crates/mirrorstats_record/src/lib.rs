@@ -24,7 +24,7 @@ pub mod metadata;
 #[cfg(feature = "view")]
 pub mod participants;
 pub mod plan;
-mod queue;
+pub mod queue;
 pub mod replay;
 pub mod replies;
 pub mod rollout;

@@ -1,4 +1,4 @@
-//! The remaining episodes of a recording.
+//! The remaining episodes of a recording, and the outcomes of the others.
 //!
 //! Rule: an experiment is complete, and returned once, when all of its episodes are recorded, lost or left out.
 
@@ -7,8 +7,24 @@ use std::sync::{Mutex, PoisonError};
 
 use super::failures::LostEpisode;
 use super::plan::Key;
+use super::replies::GivenUp;
 use mirrorstats_agents::{Turn, locked};
 use mirrorstats_experiment::Experiment;
+
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    pub recorded: Vec<Key>,
+    pub steps: u64,
+    pub lost: Vec<(Key, LostEpisode)>,
+    pub under_way: Vec<Key>,
+    /// True if a spending limit stopped it.
+    pub by_limit: bool,
+    /// The number of episodes not played because their participants have left.
+    pub left_out: usize,
+    pub stopped: bool,
+    /// The reason for the stop, if the agent could not answer.
+    pub given_up: Option<GivenUp>,
+}
 
 #[derive(Debug)]
 pub(crate) struct Queue(Mutex<WaitingKeys>);
@@ -16,25 +32,18 @@ pub(crate) struct Queue(Mutex<WaitingKeys>);
 #[derive(Debug)]
 struct WaitingKeys {
     keys: VecDeque<Key>,
-    /// The number of episodes without a player.
-    left_out: usize,
-    experiments: BTreeMap<Experiment, Outcomes>,
-    complete: Vec<(Experiment, Outcomes)>,
-}
-
-#[derive(Debug, Default)]
-pub(crate) struct Outcomes {
-    left: usize,
-    pub(crate) recorded: Vec<Key>,
-    pub(crate) lost: Vec<LostEpisode>,
+    /// The episodes of each experiment that have no outcome yet.
+    left: BTreeMap<Experiment, usize>,
+    complete: Vec<Experiment>,
+    tally: Tally,
 }
 
 impl WaitingKeys {
     fn count(&mut self, experiment: &Experiment) {
-        let outcomes = self.experiments.entry(experiment.clone()).or_default();
-        outcomes.left = outcomes.left.saturating_sub(1);
-        if outcomes.left == 0 {
-            self.complete.push((experiment.clone(), std::mem::take(outcomes)));
+        let left = self.left.entry(experiment.clone()).or_default();
+        *left = left.saturating_sub(1);
+        if *left == 0 {
+            self.complete.push(experiment.clone());
         }
     }
 }
@@ -49,16 +58,16 @@ pub(crate) enum Next {
 
 impl Queue {
     pub(crate) fn new(keys: &[Key]) -> Self {
-        let mut experiments = BTreeMap::<Experiment, Outcomes>::new();
+        let mut left = BTreeMap::new();
         for key in keys {
-            experiments.entry(key.experiment.clone()).or_default().left += 1;
+            *left.entry(key.experiment.clone()).or_default() += 1;
         }
         let keys = keys.iter().cloned().collect();
-        Self(Mutex::new(WaitingKeys { keys, left_out: 0, experiments, complete: Vec::new() }))
+        Self(Mutex::new(WaitingKeys { keys, left, complete: Vec::new(), tally: Tally::default() }))
     }
 
     pub(super) fn experiments(&self) -> Vec<Experiment> {
-        locked(&self.0).experiments.keys().cloned().collect()
+        locked(&self.0).left.keys().cloned().collect()
     }
 
     pub(crate) fn next(&self, turn: impl Fn(&Key) -> Turn) -> Next {
@@ -73,7 +82,7 @@ impl Queue {
                 Turn::Later => at += 1,
                 Turn::Never => {
                     waiting.keys.remove(at);
-                    waiting.left_out += 1;
+                    waiting.tally.left_out += 1;
                     waiting.count(&key.experiment);
                 }
             }
@@ -86,23 +95,48 @@ impl Queue {
         locked(&self.0).keys.push_back(key);
     }
 
-    pub(crate) fn ended(&self, key: &Key, lost: Option<LostEpisode>) {
+    pub(crate) fn recorded(&self, key: Key, steps: usize) {
         let mut waiting = locked(&self.0);
-        let outcomes = waiting.experiments.entry(key.experiment.clone()).or_default();
-        match lost {
-            Some(lost) => outcomes.lost.push(lost),
-            None => outcomes.recorded.push(key.clone()),
-        }
         waiting.count(&key.experiment);
+        waiting.tally.recorded.push(key);
+        waiting.tally.steps += steps as u64;
     }
 
-    pub(crate) fn complete(&self) -> Vec<(Experiment, Outcomes)> {
-        std::mem::take(&mut locked(&self.0).complete)
+    pub(crate) fn lost(&self, key: Key, lost: LostEpisode) {
+        let mut waiting = locked(&self.0);
+        waiting.count(&key.experiment);
+        waiting.tally.lost.push((key, lost));
     }
 
-    /// Once no thread uses the queue: the number of episodes without a player, and true if episodes remain.
-    pub(super) fn into_rest(self) -> (usize, bool) {
-        let rest = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
-        (rest.left_out, !rest.keys.is_empty())
+    /// Notes an episode that was stopped before its end, perhaps by a spending limit.
+    pub(crate) fn stopped(&self, key: Key, by_limit: bool) {
+        let tally = &mut locked(&self.0).tally;
+        tally.under_way.push(key);
+        tally.stopped = true;
+        tally.by_limit |= by_limit;
+    }
+
+    /// The newly complete experiments, each with its recorded and its lost episodes.
+    pub(crate) fn complete(&self) -> Vec<(Experiment, Vec<Key>, Vec<LostEpisode>)> {
+        let mut waiting = locked(&self.0);
+        let complete = std::mem::take(&mut waiting.complete);
+        let outcomes = |experiment: Experiment| {
+            let is_own = |key: &Key| key.experiment == experiment;
+            let recorded = waiting.tally.recorded.iter().filter(|key| is_own(key)).cloned().collect();
+            let lost = waiting.tally.lost.iter().filter(|(key, _)| is_own(key));
+            let lost = lost.map(|(_, lost)| lost.clone()).collect();
+            (experiment, recorded, lost)
+        };
+        complete.into_iter().map(outcomes).collect()
+    }
+
+    /// The outcomes in order, once no thread uses the queue.
+    pub(super) fn into_tally(self) -> Tally {
+        let WaitingKeys { keys, mut tally, .. } = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        tally.recorded.sort_unstable();
+        tally.lost.sort_by(|(key, _), (other, _)| key.cmp(other));
+        tally.under_way.sort_unstable();
+        tally.stopped |= !keys.is_empty();
+        tally
     }
 }

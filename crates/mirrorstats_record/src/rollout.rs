@@ -38,7 +38,6 @@ pub struct Nobody;
 impl Observer for Nobody {}
 
 pub struct EpisodeStage<'a> {
-    pub config: &'a WorldConfig,
     /// The thread's camera; `None` if no pictures are needed.
     pub eye: Option<&'a RefCell<Camera>>,
     pub looks: bool,

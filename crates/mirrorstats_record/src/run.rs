@@ -14,10 +14,10 @@ use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
 use super::error::RecordError;
 use super::eyes::Eyes;
-use super::failures::{LostEpisode, lost_episode};
+use super::failures::lost_episode;
 use super::plan::{Key, Subject};
-use super::queue::{Next, Outcomes, Queue};
-use super::replies::{GivenUp, Unusable};
+use super::queue::{Next, Queue, Tally};
+use super::replies::Unusable;
 use super::rollout::{self, EpisodeStage, Nobody, Observer, Played};
 use super::store::Store;
 use crate::replay::log::{Log, Seen};
@@ -31,10 +31,10 @@ use mirrorstats_trace::episodes::episode::{Action, Episode, Step};
 use mirrorstats_trace::episodes::episode_hash;
 
 pub trait Progress: Sync {
-    fn step(&self, episode: &Key, t: i32, row: &Step);
-    fn episode(&self, key: &Key, id: &str, steps: usize);
-    fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
-    fn lost(&self, id: &str, reason: &str);
+    fn step(&self, _episode: &Key, _t: i32, _row: &Step) {}
+    fn episode(&self, _key: &Key, _id: &str, _steps: usize) {}
+    fn model_changed(&self, _id: &str, _t: i32, _before: &str, _after: &str) {}
+    fn lost(&self, _id: &str, _reason: &str) {}
     /// The view before a decision.
     fn seen(&self, _: &Seen<'_>) {}
 }
@@ -57,21 +57,6 @@ pub struct Settings {
     pub casts: bool,
     /// The number of consecutive replies without a decision that ends the recording; `None` for no limit.
     pub max_unusable: Option<NonZeroU32>,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    pub recorded: Vec<Key>,
-    pub steps: u64,
-    pub lost: Vec<(Key, LostEpisode)>,
-    pub under_way: Vec<Key>,
-    /// True if a spending limit stopped it.
-    pub by_limit: bool,
-    /// The number of episodes not played because their participants have left.
-    pub left_out: usize,
-    pub stopped: bool,
-    /// The reason for the stop, if the agent could not answer.
-    pub given_up: Option<GivenUp>,
 }
 
 pub struct Recording<'a> {
@@ -120,25 +105,11 @@ impl Recording<'_> {
                 (0..threads).map(|at| scope.spawn(move || self.thread(queue, unusable, share(at)))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
-        let (left_out, stopped) = queue.into_rest();
-        let given_up = unusable.given_up();
-        let mut tally = Tally { left_out, stopped, given_up, ..Tally::default() };
-        for result in results {
-            let part = result?;
-            tally.recorded.extend(part.recorded);
-            tally.steps += part.steps;
-            tally.lost.extend(part.lost);
-            tally.under_way.extend(part.under_way);
-            tally.by_limit |= part.by_limit;
-            tally.stopped |= part.stopped;
-        }
-        tally.recorded.sort_unstable();
-        tally.lost.sort_by(|(key, _), (other, _)| key.cmp(other));
-        tally.under_way.sort_unstable();
-        Ok(tally)
+        results.into_iter().collect::<Result<(), _>>()?;
+        Ok(Tally { given_up: unusable.given_up(), ..queue.into_tally() })
     }
 
-    fn thread(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
+    fn thread(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<(), RecordError> {
         let result = self.episodes(queue, unusable, each);
         if result.is_err() {
             self.stop.store(true, Ordering::Relaxed);
@@ -146,12 +117,11 @@ impl Recording<'_> {
         result
     }
 
-    fn episodes(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
+    fn episodes(&self, queue: &Queue, unusable: &Unusable, each: usize) -> Result<(), RecordError> {
         let is_needed = self.settings.frames || self.player.looks();
         let eyes =
             is_needed.then(|| Eyes::new(self.config, queue.experiments())).transpose().map_err(RecordError::fatal)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
-        let mut tally = Tally::default();
         runtime.block_on(async {
             let play = |key: Key| {
                 let eye = eyes.as_ref().map(|eyes| eyes.eye(self.config, &key.experiment));
@@ -174,19 +144,18 @@ impl Recording<'_> {
                     _ => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
                 };
                 match ended {
-                    Some((key, result)) => self.note(queue, key, result, &mut tally)?,
+                    Some((key, result)) => self.note(queue, key, result)?,
                     None if is_last => break,
                     None => {}
                 }
             }
-            Ok::<(), RecordError>(())
-        })?;
-        Ok(tally)
+            Ok(())
+        })
     }
 
     /// Assembles the newly complete experiments, so that they can be viewed while others are played.
     fn assemble(&self, queue: &Queue) {
-        for (experiment, Outcomes { recorded, lost, .. }) in queue.complete() {
+        for (experiment, recorded, lost) in queue.complete() {
             // Failures here are retried and reported at the end of the recording; no episode need be lost.
             let _ = self.store.note_lost(&recorded, &lost);
             let _ = self.store.assemble(&experiment);
@@ -225,13 +194,7 @@ impl Recording<'_> {
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         episode.participant = agent.person().map(|person| person.code().to_owned());
-        let stage = EpisodeStage {
-            config: self.config,
-            eye,
-            looks: self.player.looks(),
-            casts: self.settings.casts,
-            stop: self.stop,
-        };
+        let stage = EpisodeStage { eye, looks: self.player.looks(), casts: self.settings.casts, stop: self.stop };
         if agent.person().is_some_and(|person| person.wants_practice()) {
             self.practise(&stage, agent.as_mut(), key).await?;
         }
@@ -288,37 +251,23 @@ impl Recording<'_> {
         Ok(())
     }
 
-    fn note(
-        &self,
-        queue: &Queue,
-        key: Key,
-        result: Result<usize, RecordError>,
-        tally: &mut Tally,
-    ) -> Result<(), RecordError> {
+    fn note(&self, queue: &Queue, key: Key, result: Result<usize, RecordError>) -> Result<(), RecordError> {
         let id = key.episode_id(self.subject);
         match result {
             Ok(steps) => {
                 self.progress.episode(&key, &id, steps);
-                queue.ended(&key, None);
-                tally.recorded.push(key);
-                tally.steps += steps as u64;
+                queue.recorded(key, steps);
             }
-            Err(RecordError::Stopped) => {
-                tally.under_way.push(key);
-                tally.stopped = true;
-            }
+            Err(RecordError::Stopped) => queue.stopped(key, false),
             Err(RecordError::Lost { lost: Lost { kind: LostKind::Leaving, .. }, .. }) => queue.again(key),
             Err(RecordError::Lost { lost: Lost { kind: kind @ (LostKind::Limit | LostKind::Stop), .. }, .. }) => {
-                tally.under_way.push(key);
-                tally.stopped = true;
-                tally.by_limit |= kind == LostKind::Limit;
+                queue.stopped(key, kind == LostKind::Limit);
                 self.stop.store(true, Ordering::Relaxed);
             }
             Err(RecordError::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
                 let lost = lost_episode(&key, self.subject, step, lost);
-                queue.ended(&key, Some(lost.clone()));
-                tally.lost.push((key, lost));
+                queue.lost(key, lost);
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }

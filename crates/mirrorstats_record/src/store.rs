@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 use super::error::StoreError;
 use super::failures::{self, LostEpisode};
 use super::fingerprint::Fingerprint;
-use super::index::{Place, RecordingIndex, place, recording_of};
+use super::index::{RecordingIndex, place, recording_of};
 use super::lock::{FolderLock, WRITING};
 use super::metadata::{FINGERPRINTS, Recordings, SEEDS};
 use super::plan::{Key, Subject};
@@ -38,7 +38,8 @@ use mirrorstats_trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 #[derive(Debug)]
 pub struct Store {
     folder_lock: Arc<FolderLock>,
-    index: RecordingIndex,
+    /// The content of the folder.
+    pub index: RecordingIndex,
 }
 
 impl Store {
@@ -51,14 +52,6 @@ impl Store {
         self.folder_lock.parts()
     }
 
-    pub fn trace(&self, experiment: &Experiment) -> PathBuf {
-        self.index.trace(experiment)
-    }
-
-    pub fn log(&self, experiment: &Experiment) -> PathBuf {
-        self.index.log(experiment)
-    }
-
     /// The file of an episode until the trace is assembled.
     pub fn part(&self, key: &Key) -> PathBuf {
         self.parts().join(format!("{}.parquet", key.file_stem(&self.index.subject)))
@@ -66,10 +59,6 @@ impl Store {
 
     pub(crate) fn log_part(&self, key: &Key) -> PathBuf {
         self.part(key).with_extension("mcap")
-    }
-
-    pub fn recorded(&self, experiment: &Experiment) -> Result<BTreeSet<Place>, StoreError> {
-        self.index.recorded(experiment)
     }
 
     pub fn note_lost(&self, recorded: &[Key], lost: &[LostEpisode]) -> Result<(), StoreError> {
@@ -107,7 +96,7 @@ impl Store {
         if parts.is_empty() {
             return Ok(());
         }
-        let trace = self.trace(experiment);
+        let trace = self.index.trace(experiment);
         let episodes = self.index.episodes(experiment)?;
         self.index.check_log(experiment, &episodes)?;
         let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
@@ -136,7 +125,7 @@ impl Store {
     /// The renderers of the frames that agents saw in these experiments' traces, without duplicates.
     pub fn renderers(&self, experiments: &[Experiment]) -> Result<Vec<Renderer>, StoreError> {
         let mut found = Vec::new();
-        for trace in experiments.iter().map(|experiment| self.trace(experiment)).filter(|trace| trace.exists()) {
+        for trace in experiments.iter().map(|experiment| self.index.trace(experiment)).filter(|trace| trace.exists()) {
             for renderer in renderer::of_recording(&recording_of(&trace)?) {
                 if !found.contains(&renderer) {
                     found.push(renderer);
@@ -158,7 +147,7 @@ impl Store {
         if logs.is_empty() {
             return Ok(());
         }
-        let log = self.log(experiment);
+        let log = self.index.log(experiment);
         let before = log.exists().then_some(log.as_path());
         assemble::assemble(&log, before, &logs, recording, &self.parts()).map_err(|error| match error {
             LogError::Damaged { file, fault } if Path::new(&file) != log => {

@@ -10,7 +10,7 @@ use mujoco_rs::renderer::MjRenderer;
 
 use crate::config::WorldConfig;
 use crate::label_image::Rectangle;
-use crate::model::{EYE_CAMERA, ModelError, PaintMode, Stage, TOP_CAMERA, compile, group};
+use crate::model::{EYE_CAMERA, ModelError, Stage, TOP_CAMERA, compile, group};
 use crate::visibility;
 use crate::world::World;
 use mirrorstats_trace::footers::renderer::Renderer;
@@ -43,11 +43,8 @@ pub struct Camera {
 
 impl Camera {
     pub fn new(config: &WorldConfig) -> Result<Self, CameraError> {
-        Self::painted(config, PaintMode::Lit, config.eye.width as usize, config.eye.height_px as usize)
-    }
-
-    pub fn painted(config: &WorldConfig, paint: PaintMode, width: usize, height: usize) -> Result<Self, CameraError> {
-        let model = Arc::new(compile(config, paint, [width, height])?);
+        let (width, height) = (config.eye.width as usize, config.eye.height_px as usize);
+        let model = Arc::new(compile(config)?);
         let renderer = MjRenderer::new(&model, width, height, 0)
             .map_err(|error| CameraError::NoDisplay { reason: reason(&error) })?;
         let drawn_by = current_renderer();

@@ -13,15 +13,14 @@ mod dress;
 mod shadow;
 
 pub(crate) use dress::HALF_BAR;
-pub use dress::labelled;
 
 use std::sync::Arc;
 
 use mujoco_rs::prelude::{Attach, MjData, MjEditError, MjModel, MjSpec, MjtGeomBase, MjtObjBase, SpecItem};
 
 use super::body::{BodyModel, Figure, Piece, Pose};
-use super::config::{LightsConfig, WorldConfig};
-use super::scene::{HungPane, MOST_CUBES, MOST_OTHERS, Scene};
+use super::config::{EyeConfig, LightsConfig, WorldConfig};
+use super::scene::{MOST_CUBES, MOST_OTHERS, Scene};
 use mirrorstats_experiment::angle::{Heading, Quaternion, sine_cosine};
 use mirrorstats_experiment::spec::{MOST_MARKS, MOST_PANES, Part};
 
@@ -56,9 +55,6 @@ pub mod group {
     pub const HIDDEN: i32 = 5;
 }
 
-/// Slices and stacks of round parts, and divisions of flat ones, in pictures of labels.
-const LABELLED_PARTS: [u32; 3] = [40, 24, 2];
-
 const ROOM: &str = include_str!("../../../assets/world/room.xml");
 /// The panels of textured walls, instead of the matte material.
 const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="edge" rgb1="1 1 1" markrgb="0.72 0.72 0.74" width="64" height="64"/>
@@ -67,14 +63,6 @@ const PANELS: &str = r#"<texture name="panels" type="2d" builtin="flat" mark="ed
 
 /// Bars of a frame: top, bottom and both sides.
 pub(super) const BARS: usize = 4;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PaintMode {
-    /// Lit, as the agent sees it.
-    Lit,
-    /// Every pixel has exactly the colour of its thing: no light, no shade, no smoothing.
-    Labels,
-}
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Item {
@@ -89,23 +77,6 @@ pub enum Item {
     Cube(usize),
     Mark(usize),
     Hand,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
-    /// Directly by the eye: panes are blank.
-    Direct,
-    /// Through the pane of this number.
-    Through(usize),
-}
-
-impl Sight {
-    pub(crate) fn pane(self, scene: &Scene) -> Option<(usize, &HungPane)> {
-        match self {
-            Self::Direct => None,
-            Self::Through(at) => Some((at, &scene.panes[at])),
-        }
-    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -125,10 +96,11 @@ pub struct ModelError(#[from] MjEditError);
 
 pub struct Stage {
     pub data: MjData<Arc<MjModel>>,
-    pub(crate) model: Arc<MjModel>,
+    pub model: Arc<MjModel>,
     pub items: Vec<Item>,
     pieces: Vec<(usize, [f64; 3])>,
-    pub(crate) look: Sight,
+    /// The pane of the view; `None` for the direct one, in which panes are blank.
+    pub(crate) pane: Option<usize>,
     beyond: usize,
     hand: usize,
     shown_at: u32,
@@ -137,19 +109,16 @@ pub struct Stage {
 impl Stage {
     /// The stages of a scene, for pictures of the configured size: the eye's direct view, then the view through each
     /// pane.
-    pub fn all(config: &WorldConfig, paint: PaintMode, scene: &Scene) -> Result<(Self, Vec<Self>), ModelError> {
-        let model = compile(config, paint, [config.eye.width as usize, config.eye.height_px as usize])?;
-        let stage = |look| Self::new(model.clone(), config, paint, scene, look);
-        Ok((stage(Sight::Direct), (0..scene.panes.len()).map(|pane| stage(Sight::Through(pane))).collect()))
+    pub fn all(config: &WorldConfig, scene: &Scene) -> Result<Vec<Self>, ModelError> {
+        let model = compile(config)?;
+        let panes = std::iter::once(None).chain((0..scene.panes.len()).map(Some));
+        Ok(panes.map(|pane| Self::new(model.clone(), config, scene, pane)).collect())
     }
 
-    fn new(mut model: MjModel, config: &WorldConfig, paint: PaintMode, scene: &Scene, look: Sight) -> Self {
+    fn new(mut model: MjModel, config: &WorldConfig, scene: &Scene, pane: Option<usize>) -> Self {
         let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom, scene)).collect();
-        dress::dress(&mut model, &items, config, scene, look);
-        dress::show_at(&mut model, &items, scene, 1, look);
-        if paint == PaintMode::Labels {
-            dress::label(&mut model, &items);
-        }
+        dress::dress(&mut model, &items, config, scene, pane);
+        dress::show_at(&mut model, &items, scene, 1, pane);
         let moved = |name: &str| {
             let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, name).expect("every model has this body");
             let mocap = usize::try_from(model.body_mocapid()[body]).expect("it is moved from outside");
@@ -160,13 +129,13 @@ impl Stage {
         let pieces = names.map(|name| moved(&name)).collect();
         let (beyond, hand) = (moved(BEYOND_CAMERA).0, moved(HAND).0);
         let model = Arc::new(model);
-        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, hand, shown_at: 1 }
+        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, pane, beyond, hand, shown_at: 1 }
     }
 
     fn show_at(&mut self, scene: &Scene, t: u32) {
         if scene.shown_at(t) != scene.shown_at(self.shown_at) {
             let mut model = MjModel::clone(&self.model);
-            dress::show_at(&mut model, &self.items, scene, t, self.look);
+            dress::show_at(&mut model, &self.items, scene, t, self.pane);
             self.model = Arc::new(model);
             self.data.swap_model(Arc::clone(&self.model));
         }
@@ -178,12 +147,8 @@ impl Stage {
     }
 
     pub fn show(&mut self, config: &WorldConfig, scene: &Scene, moment: &SceneMoment) {
-        self.show_at(scene, moment.t);
-        self.pose(config, moment);
-    }
-
-    fn pose(&mut self, config: &WorldConfig, moment: &SceneMoment) {
         const FAR_BELOW: f64 = -100.0;
+        self.show_at(scene, moment.t);
         for (body, figure) in moment.bodies.iter().enumerate() {
             for (at, piece) in Piece::ALL.into_iter().enumerate() {
                 let (mocap, joint) = self.pieces[body * Piece::ALL.len() + at];
@@ -243,20 +208,21 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
     }
 }
 
-pub(super) fn compile(config: &WorldConfig, paint: PaintMode, size: [usize; 2]) -> Result<MjModel, ModelError> {
-    let is_textured = config.look == mirrorstats_experiment::spec::Look::Textured && paint == PaintMode::Lit;
+/// A model without a scene, for pictures of the configured size.
+pub(super) fn compile(config: &WorldConfig) -> Result<MjModel, ModelError> {
+    let is_textured = config.look == mirrorstats_experiment::spec::Look::Textured;
     let mut spec =
         MjSpec::from_xml_string(&if is_textured { ROOM.replace("</asset>", PANELS) } else { ROOM.to_owned() })?;
-    build_room(&mut spec, config, paint);
+    build_room(&mut spec, config);
     if is_textured {
         for wall in ["wall_east", "wall_north", "wall_west", "wall_south"] {
             spec.geom_mut(wall).expect("the room has this plane").set_material("panels");
         }
     }
-    build_boxes(&mut spec, dress::FRAME, MOST_PANES * BARS, config.room.size, paint);
+    build_boxes(&mut spec, dress::FRAME, MOST_PANES * BARS, config.room.size);
     let largest = config.clutter.edges.iter().copied().fold(config.cubes.edge, f64::max);
-    build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
-    build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);
+    build_boxes(&mut spec, "cube", MOST_CUBES, largest);
+    build_boxes(&mut spec, "pane", MOST_PANES, config.room.size);
     for body in 0..BODIES {
         let mut humanoid = MjSpec::from_xml_string(BodyModel::new(config.body.shape).xml)?;
         let prefix = format!("{}_", body_name(body));
@@ -266,18 +232,12 @@ pub(super) fn compile(config: &WorldConfig, paint: PaintMode, size: [usize; 2]) 
         shadow::build(&mut spec)?;
     }
     add_eyes(&mut spec, config);
-    set_picture(&mut spec, config, paint, size);
-    match paint {
-        PaintMode::Lit => light(&mut spec, &config.lights),
-        PaintMode::Labels => {
-            let head = &mut spec.visual_mut().headlight;
-            (head.ambient, head.diffuse, head.specular) = ([1.0; 3], [0.0; 3], [0.0; 3]);
-        }
-    }
+    set_picture(&mut spec, &config.eye);
+    light(&mut spec, &config.lights);
     Ok(spec.compile()?)
 }
 
-fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: PaintMode) {
+fn build_room(spec: &mut MjSpec, config: &WorldConfig) {
     let room = &config.room;
     let [half, middle] = [room.size / 2.0, room.height / 2.0];
     let floor = [half, half, 1.0];
@@ -307,9 +267,6 @@ fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: PaintMode) {
     #[expect(clippy::cast_possible_truncation, reason = "a size of the room")]
     let repeats = (1.0 / room.tile_size) as f32;
     *material.texrepeat_mut() = [repeats, repeats];
-    if paint == PaintMode::Labels {
-        spec.geom_mut("floor").expect("the room has this plane").set_material("");
-    }
 }
 
 fn rgba(color: [f64; 3]) -> [f32; 4] {
@@ -318,7 +275,7 @@ fn rgba(color: [f64; 3]) -> [f32; 4] {
     [red, green, blue, 1.0]
 }
 
-fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint: PaintMode) {
+fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64) {
     for at in 0..count {
         let geom = spec.world_body_mut().add_geom();
         geom.set_name(&format!("{name}{at}")).expect("names of boxes differ");
@@ -330,9 +287,7 @@ fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint:
         *geom.quat_mut() = [quarter, 0.0, -quarter, 0.0];
         geom.set_contype(1);
         geom.set_conaffinity(0);
-        if paint == PaintMode::Lit {
-            geom.set_material("matte");
-        }
+        geom.set_material("matte");
     }
 }
 
@@ -355,20 +310,14 @@ fn add_eyes(spec: &mut MjSpec, config: &WorldConfig) {
     top.set_fovy(45.0);
 }
 
-fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: PaintMode, size: [usize; 2]) {
+fn set_picture(spec: &mut MjSpec, eye: &EyeConfig) {
     let visual = spec.visual_mut();
-    let [width, height] = size.map(|pixels| i32::try_from(pixels).unwrap_or(i32::MAX));
+    let counts = [eye.width, eye.height_px, eye.samples, eye.slices, eye.stacks, eye.quads];
+    let [width, height, samples, slices, stacks, quads] = counts.map(|count| i32::try_from(count).unwrap_or(i32::MAX));
     (visual.global.offwidth, visual.global.offheight) = (width, height);
-    let samples = if paint == PaintMode::Lit { config.eye.samples } else { 0 };
-    visual.quality.offsamples = i32::try_from(samples).unwrap_or(0);
-    // Drawing time depends on the triangles of round parts, and a body is a few hundred pixels high at most. Labels are
-    // compared with rays, and are as round as possible.
-    let parts = match paint {
-        PaintMode::Lit => [config.eye.slices, config.eye.stacks, config.eye.quads],
-        PaintMode::Labels => LABELLED_PARTS,
-    };
-    [visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads] =
-        parts.map(|count| i32::try_from(count).unwrap_or(i32::MAX));
+    visual.quality.offsamples = samples;
+    // Drawing time depends on the triangles of round parts, and a body is a few hundred pixels high at most.
+    (visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads) = (slices, stacks, quads);
 }
 
 /// Four equal lamps, one towards each wall, so that all walls are lit alike; one from below.

@@ -37,20 +37,10 @@ impl Scene {
     /// Draws the scene of one episode. The layout's counts override the configuration.
     pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
         let config = &config.for_layout(&experiment.layout);
-        let purpose = purpose(&experiment);
-        let Some(scene) = drawn(config, &experiment, seed, run) else {
-            let why = unsolvable(config, &experiment, seed, run);
-            return Err(Crowded { experiment, seed, run, why });
-        };
-        let layout = mirrors::PaneLayout { config, scene: &scene };
-        let why = match (layout.extras(purpose, seed, run), experiment.hand) {
-            (Err(mirror), _) => DoesNotFit::overlap(mirror),
-            (Ok(mirrors::Extras { hand: None, .. }), Some(task)) => DoesNotFit::hand(task),
-            (Ok(mirrors::Extras { stated_color, panes, marks, hand }), _) => {
-                return Ok(Self { seed, run, stated_color, panes, marks, hand, ..scene });
-            }
-        };
-        Err(Crowded { experiment, seed, run, why })
+        let drawn = drawn(config, &experiment, seed, run);
+        let drawn = drawn.ok_or_else(|| unsolvable(config, &experiment, seed, run));
+        let hung = drawn.and_then(|scene| mirrors::PaneLayout { config, scene: &scene }.hung(seed, run));
+        hung.map_err(|why| Crowded { experiment, seed, run, why })
     }
 }
 
@@ -153,10 +143,10 @@ impl Drawing<'_> {
         f64::from(self.chance.between(least, most.max(least))) / 100.0
     }
 
-    /// A point whose distance from every wall is at least `margin`.
-    fn spot(&mut self, margin: f64) -> [f64; 2] {
+    /// A point whose distance from every wall is at least `margin`, and which fits; `None` after too many draws.
+    fn fitting_spot(&mut self, margin: f64, fits: impl Fn(&[f64; 2]) -> bool) -> Option<[f64; 2]> {
         let most = self.config.room.size / 2.0 - margin;
-        [self.length(-most, most), self.length(-most, most)]
+        (0..ATTEMPTS).map(|_| [self.length(-most, most), self.length(-most, most)]).find(fits)
     }
 
     fn candidates(&mut self, mirror: MirrorPlace, palette: &[Color], count: u32) -> Option<Vec<Cube>> {
@@ -172,12 +162,11 @@ impl Drawing<'_> {
     fn candidate(&mut self, mirror: MirrorPlace, color: Color, cubes: &[Cube]) -> Option<Cube> {
         let config = self.config;
         let edge = config.cubes.edge;
-        (0..ATTEMPTS).find_map(|_| {
-            let [x, y] = self.spot(config.placement.wall_margin + edge / 2.0);
-            let fits = mirror.distance([x, y], config) + config.mirror.gap >= config.cubes.mirror_distance
-                && cubes.iter().all(|cube| distance([cube.x, cube.y], [x, y]) >= config.cubes.spacing);
-            fits.then_some(Cube { color, x, y, base: 0.0, edge })
-        })
+        let [x, y] = self.fitting_spot(config.placement.wall_margin + edge / 2.0, |spot| {
+            mirror.distance(*spot, config) + config.mirror.gap >= config.cubes.mirror_distance
+                && cubes.iter().all(|cube| distance([cube.x, cube.y], *spot) >= config.cubes.spacing)
+        })?;
+        Some(Cube { color, x, y, base: 0.0, edge })
     }
 
     /// Cubes before the mirror, or anywhere, some of them with another on top.
@@ -211,16 +200,15 @@ impl Drawing<'_> {
         cubes: &[Cube],
     ) -> Option<Cube> {
         let config = self.config;
-        (0..ATTEMPTS).find_map(|_| {
-            let [x, y] = self.spot(config.placement.wall_margin + cube.edge / 2.0);
-            let from_wall = mirror.distance([x, y], config) + config.mirror.gap;
+        let gap = 0.2 + cube.edge / 2.0;
+        let [x, y] = self.fitting_spot(config.placement.wall_margin + cube.edge / 2.0, |spot| {
+            let from_wall = mirror.distance(*spot, config) + config.mirror.gap;
             let is_there =
-                mirror.aside([x, y]).abs() <= config.mirror.width / 2.0 && from_wall <= config.clutter.mirror_distance;
-            let gap = 0.2 + cube.edge / 2.0;
-            let fits = is_before_mirror.is_none_or(|wanted| wanted == is_there)
-                && cubes.iter().all(|other| other.square().distance([x, y]) >= gap * std::f64::consts::SQRT_2);
-            fits.then_some(Cube { x, y, ..cube })
-        })
+                mirror.aside(*spot).abs() <= config.mirror.width / 2.0 && from_wall <= config.clutter.mirror_distance;
+            is_before_mirror.is_none_or(|wanted| wanted == is_there)
+                && cubes.iter().all(|other| other.square().distance(*spot) >= gap * std::f64::consts::SQRT_2)
+        })?;
+        Some(Cube { x, y, ..cube })
     }
 
     fn start(&mut self, mirror: MirrorPlace, plan: &FloorPlan, start: Start) -> Option<Pose> {
@@ -249,13 +237,10 @@ impl Drawing<'_> {
         is_there: impl Fn([f64; 2]) -> bool,
     ) -> Option<[f64; 2]> {
         let clearance = self.config.placement.clearance;
-        let margin = self.config.body.radius + self.config.mirror.gap + clearance;
-        (0..ATTEMPTS).find_map(|_| {
-            let spot = self.spot(margin);
-            let is_clear = is_there(spot)
-                && plan.admits(spot, clearance)
-                && bodies.iter().all(|body| distance(*body, spot) >= 2.0 * plan.radius + clearance);
-            is_clear.then_some(spot)
+        self.fitting_spot(self.config.body.radius + self.config.mirror.gap + clearance, |spot| {
+            is_there(*spot)
+                && plan.admits(*spot, clearance)
+                && bodies.iter().all(|body| distance(*body, *spot) >= 2.0 * plan.radius + clearance)
         })
     }
 

@@ -12,7 +12,7 @@ use super::floor::FloorPlan;
 use super::hand::{self, HandRules};
 use super::label_image::LabelImage;
 use super::mirror_eye;
-use super::model::{AGENTS, BODIES, ModelError, PaintMode, SceneMoment, Sight, Stage};
+use super::model::{AGENTS, BODIES, ModelError, SceneMoment, Stage};
 use super::scene::Scene;
 use mirrorstats_experiment::spec::{Behavior, PaneKind};
 use mirrorstats_trace::episodes::episode::Action;
@@ -37,8 +37,8 @@ pub struct World {
     hand: Option<[i32; 3]>,
     /// All bodies and the hand, the latest last, as far back as a pane shows them.
     past: VecDeque<(Vec<Figure>, Option<[i32; 3]>)>,
-    stage: Stage,
-    beyond: Vec<Stage>,
+    /// The direct view, then the view through each pane.
+    stages: Vec<Stage>,
     /// The label of every pixel of the eye's view, cached until something moves, for counts and pictures.
     pub(super) labels: OnceCell<LabelImage>,
 }
@@ -47,7 +47,7 @@ impl World {
     /// The world of a scene at its start. The experiment's lengths and counts override the configuration.
     pub fn new(config: &WorldConfig, scene: Scene) -> Result<Self, ModelError> {
         let config = config.for_experiment(&scene.experiment);
-        let (stage, beyond) = Stage::all(&config, PaintMode::Lit, &scene)?;
+        let stages = Stage::all(&config, &scene)?;
         let mut world = Self {
             plan: scene.floor_plan(&config),
             ego: Figure::standing(scene.start),
@@ -59,8 +59,7 @@ impl World {
             labels: OnceCell::new(),
             config,
             scene,
-            stage,
-            beyond,
+            stages,
         };
         world.settle();
         Ok(world)
@@ -105,12 +104,12 @@ impl World {
         self.t
     }
 
-    pub const fn stage(&self) -> &Stage {
-        &self.stage
+    pub fn stage(&self) -> &Stage {
+        &self.stages[0]
     }
 
     pub fn beyond(&self) -> &[Stage] {
-        &self.beyond
+        &self.stages[1..]
     }
 
     /// The Manhattan distance from the hand to the mark, mm; `None` without a hand.
@@ -228,29 +227,25 @@ impl World {
         while self.past.len() > latest + 1 {
             self.past.pop_front();
         }
-        let direct = self.moment(Sight::Direct);
-        self.stage.show(&self.config, &self.scene, &direct);
-        for pane in 0..self.beyond.len() {
-            let moment = self.moment(Sight::Through(pane));
-            self.beyond[pane].show(&self.config, &self.scene, &moment);
+        let mut stages = std::mem::take(&mut self.stages);
+        self.show_on(&mut stages);
+        self.stages = stages;
+    }
+
+    pub fn show_on(&self, stages: &mut [Stage]) {
+        for stage in stages {
+            stage.show(&self.config, &self.scene, &self.moment(stage.pane));
         }
     }
 
-    pub fn show_on(&self, (stage, beyond): &mut (Stage, Vec<Stage>)) {
-        for stage in std::iter::once(stage).chain(beyond) {
-            let moment = self.moment(stage.look);
-            stage.show(&self.config, &self.scene, &moment);
-        }
-    }
-
-    fn moment(&self, look: Sight) -> SceneMoment {
-        let late = look.pane(&self.scene).map_or(0, |(_, pane)| pane.delay);
+    fn moment(&self, through: Option<usize>) -> SceneMoment {
+        let late = through.map_or(0, |pane| self.scene.panes[pane].delay);
         let (figures, from_mark) = self.before(late);
         let mut bodies = [None; BODIES];
         bodies.iter_mut().zip(figures).for_each(|(place, figure)| *place = Some(figure));
-        let beyond = look.pane(&self.scene).map(|(pane, hung)| {
+        let beyond = through.map(|pane| {
             bodies[AGENTS + pane] = self.double(pane);
-            mirror_eye::eye(&self.config, hung, self.ego.pose)
+            mirror_eye::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
         });
         let rules = HandRules::for_scene(&self.scene, &self.config);
         let hand = rules.zip(from_mark).map(|(rules, from_mark)| rules.center(from_mark));

@@ -50,7 +50,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use mirrorstats_study::question::Question;
 
-use answers::{Answer, answer, labels, live};
+use answers::{Answer, answer, live};
 pub use error::ViewError;
 use snapshot::Snapshot;
 
@@ -102,11 +102,6 @@ impl View {
             Answer::Page(page) => page.into_bytes(),
         };
         answer(self, name, query).map(|answer| answer.map(bytes))
-    }
-
-    /// Adds a label sent by a page as JSON; returns the labels of its episode.
-    pub(crate) fn put_label(&self, body: &[u8]) -> Result<Vec<u8>, ViewError> {
-        labels::put(self, body).map(|value| value.to_string().into_bytes())
     }
 
     fn newest(&self) -> Arc<Snapshot> {

@@ -10,7 +10,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{get, post};
 
-use super::answers::{Answer, answer};
+use super::answers::{Answer, answer, labels};
 use super::{View, ViewError, page};
 use mirrorstats_web::{self, Guard};
 
@@ -80,8 +80,8 @@ async fn api(
 }
 
 async fn label(State(view): State<Arc<View>>, body: Bytes) -> Response {
-    match tokio::task::spawn_blocking(move || view.put_label(&body)).await {
-        Ok(Ok(bytes)) => ([(header::CONTENT_TYPE, "application/json")], bytes).into_response(),
+    match tokio::task::spawn_blocking(move || labels::put(&view, &body)).await {
+        Ok(Ok(labels)) => ([(header::CONTENT_TYPE, "application/json")], labels.to_string()).into_response(),
         Ok(Err(error)) => failed(&error),
         Err(_) => not_made(),
     }

@@ -3,7 +3,7 @@
 use mirrorstats_experiment::spec::PaneKind;
 use mirrorstats_sim::label_image::LabelImage;
 use mirrorstats_sim::mirror_eye;
-use mirrorstats_sim::model::{Item, PaintMode, Stage};
+use mirrorstats_sim::model::{Item, Stage};
 use mirrorstats_sim::visibility::{RayView, Shown};
 use mirrorstats_sim::world::World;
 
@@ -13,9 +13,9 @@ type Vector = [f64; 3];
 const SHOWN_GROUPS: [u8; 6] = [1, 1, 1, 1, 0, 0];
 
 pub(super) fn labels_by_mujoco(world: &World, width: usize, height: usize) -> LabelImage {
-    let mut stages = Stage::all(world.config(), PaintMode::Lit, world.scene()).unwrap();
+    let mut stages = Stage::all(world.config(), world.scene()).unwrap();
     world.show_on(&mut stages);
-    let (mut stage, mut beyond) = stages;
+    let (stage, beyond) = stages.split_first_mut().unwrap();
     let view = RayView::of_eye(world, width, height);
     let mut codes = Vec::with_capacity(width * height);
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {

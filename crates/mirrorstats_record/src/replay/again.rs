@@ -55,17 +55,19 @@ impl Recipe {
     }
 }
 
-/// Repeats an episode's actions; calls `look` before each step with the world and its visibility.
+/// Repeats an episode's actions up to step `last`; calls `look` before each step with the world and its visibility.
+/// The rows are compared only if all steps are repeated.
 pub fn again<E: From<ReplayError>>(
     recipe: &Recipe,
     eye: &WorldConfig,
     episode: &Episode,
+    last: i32,
     mut look: impl FnMut(i32, &World, &Visibility, &Step) -> Result<(), E>,
 ) -> Result<Option<Divergence>, E> {
     let mut world = recipe.world(episode, eye)?;
     let is_same_eye = *eye == recipe.config;
     let mut replayed = rollout::constants(world.scene());
-    for (t, step) in (1..).zip(&episode.steps) {
+    for (t, step) in (1..=last).zip(&episode.steps) {
         let visibility = world.visibility();
         look(t, &world, &visibility, step)?;
         let mut extra = rollout::world_columns(&world, &visibility, step.selected_cube.as_deref());
@@ -78,7 +80,8 @@ pub fn again<E: From<ReplayError>>(
         extra.target_distance = world.target_distance();
         replayed.steps.push(Step { mirror_visible, extra, ..Step::default() });
     }
-    Ok(divergence(episode, &replayed, is_same_eye))
+    let is_whole = replayed.steps.len() == episode.steps.len();
+    Ok(divergence(episode, &replayed, is_same_eye).filter(|_| is_whole))
 }
 
 const CONSTANTS: &[&str] = &["body_color", "stated_color", "shown_color", "start_distance", "distractors"];

@@ -62,11 +62,14 @@ impl RecordedFiles {
 
     /// The frames of an episode, from a log or else rendered from a trace; `count` steps, chosen to tell the story.
     pub fn reel(&self, episode: &str, count: usize) -> Result<Reel, ReplayError> {
-        let strip = Strip { episode: episode.to_owned(), count };
-        if let Some(reel) = strip.in_logs(&self.logs, &self.traces)? {
-            return Ok(reel);
+        for log in &self.logs {
+            if let Some((found, frames)) = in_log(log, episode)? {
+                let reel = Reel::new(found, count, frames)?;
+                self.check_traces(&reel.episode, log)?;
+                return Ok(reel);
+            }
         }
-        let rendered = if self.traces.is_empty() { None } else { strip.in_traces(&self.traces)? };
+        let rendered = if self.traces.is_empty() { None } else { self.rendered(episode, count)? };
         rendered.ok_or_else(|| {
             let named: Vec<_> = self.named.iter().map(|named| named.to_string_lossy()).collect();
             ReplayError::other(format!(
@@ -75,15 +78,45 @@ impl RecordedFiles {
             ))
         })
     }
+
+    /// Rejects a trace whose rows of the episode differ from its log's. Unreadable traces are ignored.
+    fn check_traces(&self, episode: &Episode, log: &Path) -> Result<(), ReplayError> {
+        let Some(logged) = &episode.episode_hash else { return Ok(()) };
+        for trace in &self.traces {
+            let Ok(rows) = episode_rows::read(&trace.path) else { continue };
+            let found = rows.iter().find(|rows| rows.episode_id == episode.episode_id);
+            if let Some(traced) = found.and_then(EpisodeRows::stated_hash).filter(|traced| traced != logged) {
+                return Err(ReplayError::apart(&episode.episode_id, (&trace.name, &traced), (log, logged)));
+            }
+        }
+        Ok(())
+    }
+
+    fn rendered(&self, episode: &str, count: usize) -> Result<Option<Reel>, ReplayError> {
+        let set = TraceSet::open(&self.traces).map_err(ReplayError::other)?;
+        let mut undrawable = None;
+        for (input, file) in self.traces.iter().zip(set.files()) {
+            // All rows are read at once, so a file that cannot be drawn is not read.
+            let recipe = match Recipe::from_recording(&file.recording()) {
+                Ok(recipe) => recipe,
+                Err(error) => {
+                    undrawable.get_or_insert(error);
+                    continue;
+                }
+            };
+            let rows = episode_rows::read(&input.path).map_err(ReplayError::other)?;
+            let Some(found) = rows.iter().find(|rows| rows.episode_id == episode) else { continue };
+            let episode = found.episode().map_err(ReplayError::other)?;
+            let wanted = chosen(&episode, count);
+            let frames = rendered(&recipe, &recipe.config, &episode, i32::MAX, |t| wanted.contains(&t))?;
+            return Reel::new(episode, count, frames).map(Some);
+        }
+        undrawable.map_or(Ok(None), Err)
+    }
 }
 
 fn ends_in(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|found| found == ending)
-}
-
-struct Strip {
-    episode: String,
-    count: usize,
 }
 
 /// An episode and the frames of the chosen steps, in order.
@@ -100,91 +133,42 @@ pub struct PngFrame {
     pub size: (u32, u32),
 }
 
-impl Strip {
-    fn in_logs(&self, logs: &[PathBuf], traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
-        for log in logs {
-            if let Some(reel) = self.in_log(log)? {
-                self.check_traces(&reel.episode, log, traces)?;
-                return Ok(Some(reel));
+/// An episode of a log, and its frames by t; `None` if the log does not have both.
+fn in_log(path: &Path, id: &str) -> Result<Option<(Episode, BTreeMap<i32, Vec<u8>>)>, ReplayError> {
+    let (mut head, mut end) = (None, None);
+    let (mut steps, mut frames) = (Vec::new(), BTreeMap::new());
+    for message in LogReader::open(path).map_err(ReplayError::other)? {
+        match message.map_err(ReplayError::other)?.event {
+            Event::Episode(EpisodeMessage::Begin(found)) if found.episode_id == id => head = Some(found),
+            Event::Episode(EpisodeMessage::End { fingerprint, episode_hash, .. }) if head.is_some() => {
+                end = Some((fingerprint, episode_hash));
+                break;
             }
-        }
-        Ok(None)
-    }
-
-    fn in_log(&self, path: &Path) -> Result<Option<Reel>, ReplayError> {
-        let (mut head, mut end) = (None, None);
-        let (mut steps, mut frames) = (Vec::new(), BTreeMap::new());
-        for message in LogReader::open(path).map_err(ReplayError::other)? {
-            match message.map_err(ReplayError::other)?.event {
-                Event::Episode(EpisodeMessage::Begin(found)) if found.episode_id == self.episode => head = Some(found),
-                Event::Episode(EpisodeMessage::End { fingerprint, episode_hash, .. }) if head.is_some() => {
-                    end = Some((fingerprint, episode_hash));
-                    break;
-                }
-                Event::Frame(image) if head.is_some() => {
-                    let t = i32::try_from(steps.len() + 1).unwrap_or(i32::MAX);
-                    frames.extend(png(&image).map(|png| (t, png)));
-                }
-                Event::Decision(row) if head.is_some() => steps.push(row.into_step().map_err(ReplayError::other)?),
-                _ => {}
+            Event::Frame(image) if head.is_some() => {
+                let t = i32::try_from(steps.len() + 1).unwrap_or(i32::MAX);
+                frames.extend(png(&image).map(|png| (t, png)));
             }
-        }
-        // A log without frames has the moments but no pictures: the trace renders them again.
-        let Some(head) = head.filter(|_| !frames.is_empty()) else { return Ok(None) };
-        let (fingerprint, hash) = end.unwrap_or_default();
-        match ended(*head, steps, fingerprint, hash) {
-            Ok(episode) => self.reel(episode, frames).map(Some),
-            Err((episode, fault)) => {
-                Err(ReplayError::InLog { log: path.to_owned(), episode: episode.episode_id, fault })
-            }
+            Event::Decision(row) if head.is_some() => steps.push(row.into_step().map_err(ReplayError::other)?),
+            _ => {}
         }
     }
-
-    /// Rejects a trace whose rows of the episode differ from its log's. Unreadable traces are ignored.
-    fn check_traces(&self, episode: &Episode, log: &Path, traces: &[Input]) -> Result<(), ReplayError> {
-        let Some(logged) = &episode.episode_hash else { return Ok(()) };
-        for trace in traces {
-            let Ok(rows) = episode_rows::read(&trace.path) else { continue };
-            let found = rows.iter().find(|rows| rows.episode_id == self.episode);
-            if let Some(traced) = found.and_then(EpisodeRows::stated_hash).filter(|traced| traced != logged) {
-                return Err(ReplayError::apart(&self.episode, (&trace.name, &traced), (log, logged)));
-            }
-        }
-        Ok(())
+    // A log without frames has the moments but no pictures: the trace renders them again.
+    let Some(head) = head.filter(|_| !frames.is_empty()) else { return Ok(None) };
+    let (fingerprint, hash) = end.unwrap_or_default();
+    match ended(*head, steps, fingerprint, hash) {
+        Ok(episode) => Ok(Some((episode, frames))),
+        Err((episode, fault)) => Err(ReplayError::InLog { log: path.to_owned(), episode: episode.episode_id, fault }),
     }
+}
 
-    fn in_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
-        let set = TraceSet::open(traces).map_err(ReplayError::other)?;
-        let mut undrawable = None;
-        for (input, file) in traces.iter().zip(set.files()) {
-            // All rows are read at once, so a file that cannot be drawn is not read.
-            let recipe = match Recipe::from_recording(&file.recording()) {
-                Ok(recipe) => recipe,
-                Err(error) => {
-                    undrawable.get_or_insert(error);
-                    continue;
-                }
-            };
-            let rows = episode_rows::read(&input.path).map_err(ReplayError::other)?;
-            let Some(found) = rows.iter().find(|rows| rows.episode_id == self.episode) else { continue };
-            return self.rendered(&recipe, found.episode().map_err(ReplayError::other)?).map(Some);
-        }
-        undrawable.map_or(Ok(None), Err)
-    }
-
-    fn rendered(&self, recipe: &Recipe, episode: Episode) -> Result<Reel, ReplayError> {
-        let wanted = chosen(&episode, self.count);
-        let frames = rendered(recipe, &recipe.config, &episode, i32::MAX, |t| wanted.contains(&t))?;
-        self.reel(episode, frames)
-    }
-
-    fn reel(&self, episode: Episode, mut frames: BTreeMap<i32, Vec<u8>>) -> Result<Reel, ReplayError> {
+impl Reel {
+    fn new(episode: Episode, count: usize, mut frames: BTreeMap<i32, Vec<u8>>) -> Result<Self, ReplayError> {
         let frame = |t| match frames.remove(&t) {
             Some(png) => PngFrame::new(t, png),
-            None => Err(ReplayError::NoFrame { episode: self.episode.clone(), t }),
+            None => Err(ReplayError::NoFrame { episode: episode.episode_id.clone(), t }),
         };
-        let frames = chosen(&episode, self.count).into_iter().map(frame).collect::<Result<_, _>>()?;
-        Ok(Reel { episode, frames })
+        let frames = chosen(&episode, count).into_iter().map(frame).collect::<Result<_, _>>()?;
+        Ok(Self { episode, frames })
     }
 }
 

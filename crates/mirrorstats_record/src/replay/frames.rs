@@ -14,17 +14,6 @@ use mirrorstats_trace::episodes::episode::Episode;
 /// The rows of rays for visibility here, where the counts are unused: counting takes most of a replay's time.
 const RAYS: u32 = 24;
 
-enum Halt {
-    Done,
-    Fault(ReplayError),
-}
-
-impl From<ReplayError> for Halt {
-    fn from(error: ReplayError) -> Self {
-        Self::Fault(error)
-    }
-}
-
 /// The frames of these steps as PNG, by t; `recording` is the trace's metadata on its recording.
 pub fn frames(
     recording: Option<&Value>,
@@ -43,11 +32,11 @@ pub fn shapes(
 ) -> Result<(), ReplayError> {
     let (recipe, eye) = with_few_rays(recording)?;
     check_rays(rays(episode.steps.len(), &eye), 0)?;
-    let ended = again(&recipe, &eye, episode, |t, world, _, _| -> Result<(), ReplayError> {
+    let parted = again(&recipe, &eye, episode, i32::MAX, |t, world, _, _| -> Result<(), ReplayError> {
         give(usize::try_from(t).unwrap_or_default(), &world.snapshot().solids);
         Ok(())
-    });
-    ended?.map_or(Ok(()), |parted| Err(ReplayError::Diverged(parted)))
+    })?;
+    parted.map_or(Ok(()), |parted| Err(ReplayError::Diverged(parted)))
 }
 
 fn with_few_rays(recording: Option<&Value>) -> Result<(Recipe, WorldConfig), ReplayError> {
@@ -69,21 +58,14 @@ pub(super) fn rendered(
     check_rays(rays(episode.steps.len(), eye), 0)?;
     let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
     let mut frames = BTreeMap::new();
-    let ended = again(recipe, eye, episode, |t, world, _, _| {
-        if t > last {
-            return Err(Halt::Done);
-        }
+    let parted = again(recipe, eye, episode, last, |t, world, _, _| {
         if is_wanted(t) {
             let frame = camera.frame(world).map_err(ReplayError::other)?;
             frames.insert(t, frame.to_png().map_err(ReplayError::other)?.to_vec());
         }
-        Ok(())
-    });
-    match ended {
-        Ok(Some(parted)) => Err(ReplayError::Diverged(parted)),
-        Ok(None) | Err(Halt::Done) => Ok(frames),
-        Err(Halt::Fault(error)) => Err(error),
-    }
+        Ok::<(), ReplayError>(())
+    })?;
+    parted.map_or(Ok(frames), |parted| Err(ReplayError::Diverged(parted)))
 }
 
 /// Returns true if a trace describes its world, and this program can build it.

@@ -7,5 +7,4 @@ pub mod error;
 pub mod filmstrip;
 pub mod frames;
 pub mod log;
-pub mod outputs;
 pub mod verify;

@@ -11,10 +11,10 @@ use serde_json::Value;
 use super::again::{Recipe, again};
 use super::error::{Divergence, ReplayError};
 use super::log::{Log, Seen};
-use super::outputs::Outputs;
 use mirrorstats_exact::budget::Limit;
-use mirrorstats_exact::replace::TemporaryFolder;
+use mirrorstats_exact::replace::{TemporaryFolder, check_target, folder_of, is_same_file};
 use mirrorstats_log::assemble;
+use mirrorstats_log::read::{episode_hashes, other_episode};
 use mirrorstats_sim::camera::Camera;
 use mirrorstats_sim::config::WorldConfig;
 use mirrorstats_trace::episodes::episode::Episode;
@@ -91,7 +91,7 @@ impl RecordedTrace {
         Ok(traces)
     }
 
-    pub(super) fn check_work(traces: &[Self]) -> Result<(), ReplayError> {
+    fn check_work(traces: &[Self]) -> Result<(), ReplayError> {
         let bytes =
             traces.iter().map(|trace| std::fs::metadata(&trace.path).map_or(0, |metadata| metadata.len())).sum();
         let steps = |trace: &Self| trace.rows.iter().map(EpisodeRows::len).sum();
@@ -106,21 +106,21 @@ impl RecordedTrace {
         answer: &mut ReplayAnswer,
         mut save: impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let camera = self.camera(outputs, answer)?;
+        let mut camera = self.camera(outputs, answer)?;
         let parts = TemporaryFolder::private("replay").map_err(ReplayError::other)?;
-        let mut player = TracePlayer { trace: self, outputs, camera };
         let mut logs = Vec::new();
         for rows in &self.rows {
             let episode = rows.episode().map_err(ReplayError::other)?;
             let part = parts.path().join(format!("{}.mcap", logs.len()));
-            let divergence = player.episode(&episode, &part, answer.frames.as_mut(), &mut save)?;
+            let frames = answer.frames.as_mut();
+            let divergence = self.episode(&episode, outputs, &part, (camera.as_mut(), frames), &mut save)?;
             answer.episodes += 1;
             answer.steps += episode.steps.len();
             answer.divergences.extend(divergence);
             logs.push((assemble::place(&episode), part));
         }
         if let Some(path) = &outputs.log {
-            assemble::write(path, &logs, &self.recording).map_err(ReplayError::other)?;
+            assemble::assemble(path, None, &logs, &self.recording, folder_of(path)).map_err(ReplayError::other)?;
         }
         Ok(())
     }
@@ -141,6 +141,42 @@ impl RecordedTrace {
             frames.not_compared = camera.as_ref().err().map(ToString::to_string);
         }
         Ok(camera.ok())
+    }
+
+    fn episode<E: From<ReplayError>>(
+        &self,
+        episode: &Episode,
+        outputs: &Outputs,
+        part: &Path,
+        (mut camera, mut frames): (Option<&mut Camera>, Option<&mut FramesAnswer>),
+        save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
+    ) -> Result<Option<Divergence>, E> {
+        let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
+        let log = outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
+        let mut log = log.transpose().map_err(unwritten)?;
+        let mut other_frame = None;
+        let divergence = again(&self.recipe, &self.recipe.config, episode, i32::MAX, |t, world, visibility, step| {
+            let frame = camera.as_mut().map(|camera| camera.frame(world)).transpose();
+            let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
+            let recorded = step.extra.frame_digest.as_deref();
+            if let (Some(frames), Some(recorded), Some(frame)) = (&mut frames, recorded, &frame) {
+                let other = frames.add((&episode.episode_id, t), recorded, frame);
+                other_frame = other_frame.take().or(other);
+            }
+            if let (Some(folder), Some(frame)) = (&outputs.frames, &frame) {
+                let png = frame.to_png().map_err(ReplayError::other)?;
+                save(&frame_path(folder, &episode.episode_id, t), png)?;
+            }
+            if let Some(log) = &mut log {
+                let seen = Seen { t, world, frame: frame.as_ref(), visibility };
+                log.seen(&seen).and_then(|()| log.done(t, step)).map_err(unwritten)?;
+            }
+            Ok::<(), E>(())
+        })?;
+        if let Some(log) = log {
+            log.end(episode).map_err(unwritten)?;
+        }
+        Ok([divergence, other_frame].into_iter().flatten().min_by_key(|divergence| divergence.t))
     }
 }
 
@@ -175,50 +211,68 @@ impl FramesAnswer {
     }
 }
 
-struct TracePlayer<'a> {
-    trace: &'a RecordedTrace,
-    outputs: &'a Outputs,
-    camera: Option<Camera>,
+fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {
+    folder.join(episode_id.replace('/', "-")).join(format!("t{t:0>3}.png"))
 }
 
-impl TracePlayer<'_> {
-    fn episode<E: From<ReplayError>>(
-        &mut self,
-        episode: &Episode,
-        part: &Path,
-        mut frames: Option<&mut FramesAnswer>,
-        save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
-    ) -> Result<Option<Divergence>, E> {
-        let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
-        let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
-        let mut log = log.transpose().map_err(unwritten)?;
-        let mut other_frame = None;
-        let divergence =
-            again(&self.trace.recipe, &self.trace.recipe.config, episode, |t, world, visibility, step| {
-                let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
-                let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
-                let recorded = step.extra.frame_digest.as_deref();
-                if let (Some(frames), Some(recorded), Some(frame)) = (&mut frames, recorded, &frame) {
-                    let other = frames.add((&episode.episode_id, t), recorded, frame);
-                    other_frame = other_frame.take().or(other);
-                }
-                if let (Some(folder), Some(frame)) = (&self.outputs.frames, &frame) {
-                    let png = frame.to_png().map_err(ReplayError::other)?;
-                    save(&frame_path(folder, &episode.episode_id, t), png)?;
-                }
-                if let Some(log) = &mut log {
-                    let seen = Seen { t, world, frame: frame.as_ref(), visibility };
-                    log.seen(&seen).and_then(|()| log.done(t, step)).map_err(unwritten)?;
-                }
-                Ok::<(), E>(())
-            })?;
-        if let Some(log) = log {
-            log.end(episode).map_err(unwritten)?;
+/// The outputs of a replay.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    pub frames: Option<PathBuf>,
+    pub log: Option<PathBuf>,
+}
+
+impl Outputs {
+    /// Refuses traces that would take too long, and outputs that would replace a trace, or a log of other rows or, for a
+    /// replay of one episode, of other episodes.
+    pub fn check(&self, traces: &[RecordedTrace], episode: Option<&str>) -> Result<(), ReplayError> {
+        if traces.len() > 1 && self.log.is_some() {
+            return Err(ReplayError::other("--mcap takes a single trace"));
         }
-        Ok([divergence, other_frame].into_iter().flatten().min_by_key(|divergence| divergence.t))
+        RecordedTrace::check_work(traces)?;
+        let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
+        if self.log.as_ref().is_some_and(is_trace) {
+            return Err(ReplayError::other("--mcap is the trace itself; name another file"));
+        }
+        for (folder, trace) in self.frames.iter().flat_map(|folder| traces.iter().map(move |trace| (folder, trace))) {
+            for (rows, t) in trace.rows.iter().flat_map(|rows| (1..=rows.len()).map(move |t| (rows, t))) {
+                let frame = frame_path(folder, &rows.episode_id, t);
+                let read = traces.iter().map(|trace| &trace.path);
+                check_target(&frame, read, "one that is read").map_err(ReplayError::other)?;
+            }
+        }
+        let Some(log) = self.log.as_deref().filter(|log| log.is_file()) else { return Ok(()) };
+        if let Some(id) = episode {
+            check_episodes(log, id)?;
+        }
+        check_hashes(log, traces)
     }
 }
 
-pub(super) fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {
-    folder.join(episode_id.replace('/', "-")).join(format!("t{t:0>3}.png"))
+fn check_hashes(log: &Path, traces: &[RecordedTrace]) -> Result<(), ReplayError> {
+    // A file that is not a readable log may be replaced.
+    let Ok(logged) = episode_hashes(log) else { return Ok(()) };
+    for (trace, rows) in traces.iter().flat_map(|trace| trace.rows.iter().map(move |rows| (trace, rows))) {
+        let hashes = rows.stated_hash().zip(logged.get(&rows.episode_id));
+        if let Some((traced, logged)) = hashes.filter(|(traced, logged)| traced != *logged) {
+            let name = trace.path.display().to_string();
+            return Err(ReplayError::apart(&rows.episode_id, (&name, &traced), (log, logged)));
+        }
+    }
+    Ok(())
+}
+
+fn check_episodes(log: &Path, id: &str) -> Result<(), ReplayError> {
+    let found = match other_episode(log, id) {
+        Ok(None) => return Ok(()),
+        Ok(Some(other)) => format!("one with the episode `{other}`"),
+        Err(error) => {
+            let error = error.to_string();
+            format!("a file whose episodes cannot be read ({})", error.lines().next().unwrap_or_default())
+        }
+    };
+    Err(ReplayError::other(format!(
+        "`{}`: expected no file, or a log of the episode `{id}` alone, found {found}\n  help: give --mcap another name, or leave out --episode to replace the whole log",
+        log.display()
+    )))
 }

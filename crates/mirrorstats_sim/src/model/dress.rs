@@ -5,7 +5,7 @@ use mujoco_rs::prelude::{MjModel, MjtObjBase};
 use super::super::body::BodyModel;
 use super::super::config::WorldConfig;
 use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
-use super::{AGENTS, BARS, Item, Sight, group, numbered, shadow};
+use super::{AGENTS, BARS, Item, group, numbered, shadow};
 use crate::scene::MOST_CUBES;
 use mirrorstats_experiment::angle::{Heading, Quaternion};
 use mirrorstats_experiment::spec::{MOST_MARKS, PaneKind};
@@ -20,15 +20,16 @@ const BLANK: [u8; 3] = [128, 132, 138];
 /// Walls by their quarter turns from +x.
 const WALLS: [&str; 4] = ["wall_east", "wall_north", "wall_west", "wall_south"];
 
-pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, scene: &Scene, look: Sight) {
-    let pane = look.pane(scene);
+/// `through` is the pane of the view; `None` for the direct one.
+pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, scene: &Scene, through: Option<usize>) {
+    let pane = through.map(|at| (at, &scene.panes[at]));
     let is_window = pane.is_some_and(|(_, pane)| pane.kind == PaneKind::Window);
     let neutral = BodyModel::new(config.body.shape).neutral_parts;
     for (geom, item) in items.iter().enumerate() {
         match *item {
             Item::Room => {
                 hide_wall(model, geom, pane.map(|(_, pane)| pane));
-                frame(model, geom, scene, look, config);
+                frame(model, geom, scene, config, pane.is_none());
                 let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default().to_owned();
                 shadow::dress(model, geom, &name, scene, pane);
             }
@@ -56,9 +57,9 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
 }
 
 /// Shows the marks and the panes of a step, counted from 1.
-pub(super) fn show_at(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, look: Sight) {
-    let pane = look.pane(scene).map(|(_, pane)| pane);
-    if look == Sight::Direct {
+pub(super) fn show_at(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, through: Option<usize>) {
+    let pane = through.map(|at| &scene.panes[at]);
+    if pane.is_none() {
         show_panes(model, items, scene, t);
     }
     for (geom, item) in items.iter().enumerate() {
@@ -70,9 +71,7 @@ pub(super) fn show_at(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32
             (true, 0) => group::EGO,
             (true, _) => group::THINGS,
         };
-        if model.geom_rgba()[geom][1] != LABEL_GREEN {
-            model.geom_rgba_mut()[geom] = paint(mark.color.rgb());
-        }
+        model.geom_rgba_mut()[geom] = paint(mark.color.rgb());
     }
 }
 
@@ -87,28 +86,6 @@ fn show_panes(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32) {
             model.geom_group_mut()[geom] = if pane.is_shown_at(t) { group::ROOM } else { group::HIDDEN };
         }
     }
-}
-
-pub(super) fn label(model: &mut MjModel, items: &[Item]) {
-    for (geom, item) in items.iter().enumerate() {
-        model.geom_rgba_mut()[geom] = match *item {
-            Item::Pane(pane) => paint([0, step(pane + 1), 0]),
-            item => {
-                let [red, green, blue, opacity] = paint([step(item.number()), 0, 0]);
-                // Ensures that a mark that appears keeps its label.
-                [red, if matches!(item, Item::Mark(_)) { LABEL_GREEN } else { green }, blue, opacity]
-            }
-        };
-    }
-}
-
-const STEP: usize = 8;
-
-/// Too little green to be visible in eight bits.
-const LABEL_GREEN: f32 = 0.001;
-
-fn step(number: usize) -> u8 {
-    u8::try_from(STEP * number).expect("a world holds fewer than 30 things")
 }
 
 impl Item {
@@ -136,16 +113,6 @@ impl Item {
             _ if number == Self::COUNT - 2 => Self::Hand,
             _ => Self::Double,
         }
-    }
-}
-
-/// The meaning of the label with this red and green, regardless of what a pane shows; `None` for no label.
-pub fn labelled([red, green]: [u8; 2]) -> Option<Item> {
-    let number = |part: u8| (usize::from(part) % STEP == 0).then_some(usize::from(part) / STEP);
-    let (red, green) = (number(red)?, number(green)?);
-    match green.checked_sub(1) {
-        Some(pane) => (red == 0).then_some(Item::Pane(pane)),
-        None => Some(Item::from_number(red)),
     }
 }
 
@@ -184,10 +151,10 @@ pub(crate) const HALF_BAR: f64 = 0.03;
 pub(super) const FRAME: &str = "frame";
 
 /// Puts a frame's bar beside its pane, flush with it, so that it hides nothing; only direct views show frames.
-fn frame(model: &mut MjModel, geom: usize, scene: &Scene, look: Sight, config: &WorldConfig) {
+fn frame(model: &mut MjModel, geom: usize, scene: &Scene, config: &WorldConfig, is_direct: bool) {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let Some(number) = numbered(name, FRAME) else { return };
-    let pane = scene.panes.get(number / BARS).filter(|pane| pane.frame && look == Sight::Direct);
+    let pane = scene.panes.get(number / BARS).filter(|pane| pane.frame && is_direct);
     let Some(pane) = pane else { return hide(model, geom) };
     let [x, y] = pane.place.center(config);
     let [out_x, out_y] = pane.place.heading().direction();

@@ -12,7 +12,7 @@ use super::super::scene::{
     HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, Scene, WornMark, floor_plan, manhattan,
 };
 use super::balance::strange_colors;
-use super::{Drawing, is_in_view};
+use super::{DoesNotFit, Drawing, is_in_view, purpose};
 use mirrorstats_experiment::angle::{HEADINGS, Heading};
 use mirrorstats_experiment::spec::{
     BodyShown, Hand, Look, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer,
@@ -37,18 +37,10 @@ pub(super) struct PaneLayout<'a> {
     pub scene: &'a Scene,
 }
 
-/// The draws in addition to the layout.
-#[derive(Debug, Default)]
-pub(super) struct Extras {
-    pub stated_color: Option<Color>,
-    pub panes: Vec<HungPane>,
-    pub marks: Vec<WornMark>,
-    pub hand: Option<HandStart>,
-}
-
 impl PaneLayout<'_> {
-    /// The draws; an error is the index of a pane without room beside others on its wall.
-    pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Result<Extras, usize> {
+    /// The scene of a seed and run, with its panes and marks.
+    pub(super) fn hung(&self, seed: i32, run: i32) -> Result<Scene, DoesNotFit> {
+        let purpose = purpose(&self.scene.experiment);
         let stream = |at: u64| Rng::for_run(purpose ^ (PURPOSE + at), seed, run);
         // Separate streams, so that an unused one does not affect the others.
         let marks = self.marks(stream);
@@ -70,9 +62,12 @@ impl PaneLayout<'_> {
             let mut chance = stream(at);
             let place = if panes.is_empty() { self.scene.mirror } else { self.place(pane, &panes, &mut chance)? };
             let other = if pane.kind == PaneKind::Window { strange } else { another };
-            panes.push(self.hung(pane, place, other, &mut chance));
+            panes.push(self.pane(pane, place, other, &mut chance));
         }
-        Ok(Extras { stated_color, panes, marks, hand })
+        match self.scene.experiment.hand {
+            Some(task) if hand.is_none() => Err(DoesNotFit::hand(task)),
+            _ => Ok(Scene { seed, run, stated_color, panes, marks, hand, ..self.scene.clone() }),
+        }
     }
 
     /// The marks in the order of the experiment. Those on others are drawn first: they are visible without a mirror, so
@@ -132,7 +127,7 @@ impl PaneLayout<'_> {
         palette.filter(|color| *color != self.scene.body_color && is_free(*color)).collect()
     }
 
-    fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> Result<MirrorPlace, usize> {
+    fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> Result<MirrorPlace, DoesNotFit> {
         let first = before[0].place.wall;
         let fixed = match pane.wall {
             Wall::Opposite => Some((first + 2) % 4),
@@ -144,7 +139,8 @@ impl PaneLayout<'_> {
         let width = pane.width_mm.map_or(config.mirror.width, metres);
         if let Some(wall) = fixed.filter(|wall| !free.contains(wall)) {
             let offsets = self.beside(wall, width, before);
-            let offset = (!offsets.is_empty()).then(|| chance.one_of(&offsets)).ok_or(before.len())?;
+            let offset = (!offsets.is_empty()).then(|| chance.one_of(&offsets));
+            let offset = offset.ok_or_else(|| DoesNotFit::overlap(before.len()))?;
             return Ok(MirrorPlace { wall, offset });
         }
         let slack = (config.room.size / 2.0 - width / 2.0 - config.placement.wall_margin).max(0.0);
@@ -170,7 +166,7 @@ impl PaneLayout<'_> {
         offsets.filter(is_free).collect()
     }
 
-    fn hung(&self, pane: &Pane, place: MirrorPlace, other: Color, chance: &mut Rng) -> HungPane {
+    fn pane(&self, pane: &Pane, place: MirrorPlace, other: Color, chance: &mut Rng) -> HungPane {
         let mirror = &self.config.mirror;
         let room = &self.config.room;
         let width = pane.width_mm.map_or(mirror.width, metres);
@@ -228,15 +224,12 @@ impl PaneLayout<'_> {
             Wearer::Own => (0, self.scene.body_color),
             Wearer::Other => (1, self.scene.others.first()?.color),
         };
-        let is_free = |color: Color| color != body;
-        let colors = |is_free: &dyn Fn(Color) -> bool| {
-            let palette = self.scene.experiment.layout.palette.iter().copied();
-            palette.filter(|color| is_free(*color)).collect::<Vec<_>>()
-        };
-        let (free, unused) = (colors(&is_free), colors(&|color| is_free(color) && !before.contains(&color)));
+        let palette = self.scene.experiment.layout.palette.iter().copied();
+        let free: Vec<Color> = palette.filter(|color| *color != body).collect();
+        let unused: Vec<Color> = free.iter().copied().filter(|color| !before.contains(color)).collect();
         let drawn = if unused.is_empty() { &free } else { &unused };
         let color = match mark.color {
-            MarkColor::Named(color) if is_free(color) => color,
+            MarkColor::Named(color) if color != body => color,
             MarkColor::Named(_) | MarkColor::Random if drawn.is_empty() => return None,
             MarkColor::Named(_) | MarkColor::Random => chance.one_of(drawn),
         };

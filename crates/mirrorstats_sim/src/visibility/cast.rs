@@ -1,13 +1,15 @@
 //! Views over the pixels, direct and through each pane, row by row, each part within its bounding rectangle.
 
 use super::super::label_image::Rectangle;
-use super::super::model::{Item, Sight, Stage};
+use super::super::model::{Item, Stage};
 use super::super::world::World;
-use super::shape::{SolidPart, solid};
+use super::shape::{RaySolid, solid};
 use super::view::{RayView, Shown};
 
 struct Candidate {
-    part: SolidPart,
+    /// The label code of its thing in this view.
+    code: u8,
+    solid: RaySolid,
     rectangle: Rectangle,
 }
 
@@ -24,7 +26,7 @@ pub(super) fn rows(world: &World, width: usize, height: usize, mut each: impl Fn
         .beyond()
         .iter()
         .enumerate()
-        .filter(|(at, _)| direct.candidates.iter().any(|candidate| candidate.part.code == pane_code(*at)))
+        .filter(|(at, _)| direct.candidates.iter().any(|candidate| candidate.code == pane_code(*at)))
         .map(|(at, stage)| (at, Pass::new(view.through(world, &world.scene().panes[at]), stage)))
         .collect();
     let mut row = vec![0; width];
@@ -46,13 +48,15 @@ fn pane_code(pane: usize) -> u8 {
 
 impl Pass {
     fn new(view: RayView, stage: &Stage) -> Self {
-        let code = |item: Item| match stage.look {
-            Sight::Direct => Shown::Direct(item).code(),
-            Sight::Through(pane) => Shown::Through(pane, item).code(),
+        let code = |item: Item| match stage.pane {
+            None => Shown::Direct(item).code(),
+            Some(pane) => Shown::Through(pane, item).code(),
         };
         let shown = stage.items.iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
-        let parts = shown.map(|(geom, item)| SolidPart { code: code(*item), solid: solid(stage, geom) });
-        let candidates = parts.filter_map(|part| Some(Candidate { part, rectangle: part.solid.rectangle(&view)? }));
+        let candidates = shown.filter_map(|(geom, item)| {
+            let solid = solid(stage, geom);
+            Some(Candidate { code: code(*item), solid, rectangle: solid.rectangle(&view)? })
+        });
         Self { view, candidates: candidates.collect(), depths: vec![f64::INFINITY; view.width] }
     }
 
@@ -61,15 +65,15 @@ impl Pass {
         self.depths.fill(f64::INFINITY);
         let view = self.view;
         let in_row = |candidate: &&Candidate| (candidate.rectangle.top..candidate.rectangle.bottom).contains(&y);
-        for Candidate { part, rectangle } in self.candidates.iter().filter(in_row) {
+        for Candidate { code, solid, rectangle } in self.candidates.iter().filter(in_row) {
             let columns = rectangle.left..rectangle.right;
             let pixels = row[columns.clone()].iter_mut().zip(&mut self.depths[columns.clone()]);
             for (x, (pixel, depth)) in columns.zip(pixels).filter(|(_, (pixel, _))| is_open(**pixel)) {
-                if let Some(met) = part.solid.meets(view.origin, view.ray(x, y))
+                if let Some(met) = solid.meets(view.origin, view.ray(x, y))
                     && met < *depth
                 {
                     *depth = met;
-                    *pixel = part.code;
+                    *pixel = *code;
                 }
             }
         }

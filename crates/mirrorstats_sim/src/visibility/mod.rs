@@ -47,7 +47,7 @@ impl World {
 /// picture. The room always may.
 pub(crate) fn in_view(world: &World, stage: &Stage, size: [usize; 2], within: Rectangle) -> Vec<bool> {
     let view = RayView::of_eye(world, size[0], size[1]);
-    let view = stage.look.pane(world.scene()).map_or(view, |(_, pane)| view.through(world, pane));
+    let view = stage.pane.map_or(view, |pane| view.through(world, &world.scene().panes[pane]));
     let is_in_view = |(geom, item): (usize, &Item)| {
         *item == Item::Room
             || (stage.is_shown(geom)

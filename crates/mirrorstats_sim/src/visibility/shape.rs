@@ -8,13 +8,6 @@ use super::super::model::Stage;
 use super::view::{RayView, Vector, dot, minus, plus};
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SolidPart {
-    /// The label code of its thing in this view.
-    pub code: u8,
-    pub solid: RaySolid,
-}
-
-#[derive(Clone, Copy, Debug)]
 pub(super) enum RaySolid {
     /// A sphere if `half` is 0.
     Capsule { center: Vector, axis: Vector, half: f64, radius: f64 },

@@ -44,7 +44,8 @@ use mirrorstats_record::index::RecordingIndex;
 use mirrorstats_record::lock::FolderLock;
 use mirrorstats_record::metadata::Recordings;
 use mirrorstats_record::plan::{Episodes, Experiments, Key, Named, Plan, Shard, Subject};
-use mirrorstats_record::run::{Recording, Settings, Tally};
+use mirrorstats_record::queue::Tally;
+use mirrorstats_record::run::{Recording, Settings};
 use mirrorstats_record::store::Store;
 use mirrorstats_sim::config::WorldConfig;
 
@@ -274,7 +275,7 @@ impl RecordArgs {
         let plan = &self.planned(config)?;
         let subject = &self.subject(player);
         let store = &Store::new(Arc::new(lock), subject.clone(), self.recordings(config, plan, player)?);
-        let episodes = Episodes::of(plan, |experiment| store.recorded(experiment))?;
+        let episodes = Episodes::of(plan, |experiment| store.index.recorded(experiment))?;
         let Episodes { planned, todo } = &episodes;
         player.begin(&episodes, subject)?;
         let bar = Bar::new(player, subject, todo, config);
@@ -310,8 +311,8 @@ impl RecordArgs {
             spend: player.spend(),
             stopped,
             renderers: store.renderers(&plan.experiments)?,
-            traces: files(plan, |experiment| store.trace(experiment)),
-            logs: files(plan, |experiment| store.log(experiment)),
+            traces: files(plan, |experiment| store.index.trace(experiment)),
+            logs: files(plan, |experiment| store.index.log(experiment)),
         };
         let gave_up = player.player().stopped().or_else(|| given_up.map(|given_up| given_up.to_string()));
         let forgotten = if stopped && !player.keeps_steps() { bar.steps().saturating_sub(steps) } else { 0 };

@@ -9,8 +9,7 @@ use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace;
 use mirrorstats_record::replay::error::Divergence;
-use mirrorstats_record::replay::outputs::Outputs;
-use mirrorstats_record::replay::verify::{FramesAnswer, RecordedTrace, ReplayAnswer};
+use mirrorstats_record::replay::verify::{FramesAnswer, Outputs, RecordedTrace, ReplayAnswer};
 use mirrorstats_trace::footers::renderer::Renderer;
 use mirrorstats_trace::inputs;
 

@@ -105,10 +105,8 @@ impl Results {
         let kept: BTreeSet<&str> = means.iter().take(most).map(|mean| mean.model).collect();
         let is_kept = |row: &usize| kept.contains(episodes.keys.get(*row).model);
         let rows: Vec<usize> = (0..episodes.len()).filter(is_kept).collect();
-        let outcomes = self.outcomes.clone().map(|Outcomes { experiment, mut rows }| {
-            rows.retain(|row| kept.contains(row.model.as_str()));
-            Outcomes { experiment, rows }
-        });
+        let mut outcomes = self.outcomes.clone();
+        outcomes.iter_mut().for_each(|found| found.rows.retain(|model, _| kept.contains(model.as_str())));
         Self { outcomes, ..self.taken(&rows) }
     }
 

@@ -109,8 +109,8 @@ pub(crate) fn rate_ticks() -> [Tick; 5] {
 /// At most `most` integers from 0 to `last`, at even distances.
 pub(crate) fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
     let last = last as usize;
-    let steps = (0..).flat_map(|power| [1, 2, 5].map(|first| first * 10_usize.pow(power)));
-    let step = steps.into_iter().find(|step| last / step < most).unwrap_or(usize::MAX);
+    let mut steps = (0..).flat_map(|power| [1, 2, 5].map(|first| first * 10_usize.pow(power)));
+    let step = steps.find(|step| last / step < most).unwrap_or(usize::MAX);
     (0..=last).step_by(step).map(|at| Tick { at: many(at), text: at.to_string() }).collect()
 }
 

@@ -82,8 +82,7 @@ impl Study {
     /// Sets the definitions: `paper`, `extended`, or the path of a TOML file. Errors: a file that cannot be read; every
     /// fault in it.
     pub fn definitions(self, name: impl Into<PathBuf>) -> Result<Self, StudyError> {
-        let definitions = Some(name.into());
-        let question = Question { definitions, ..self.question.clone() };
+        let question = Question { definitions: Some(name.into()), ..self.question.clone() };
         self.asked(question)
     }
 

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 #[cfg(feature = "sim")]
 use clap::builder::OsStringValueParser;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::cli::{Failure, output};
 #[cfg(feature = "sim")]
@@ -81,10 +81,7 @@ impl ScoringArgs {
             metrics: self.metrics.clone(),
             by: grouping.by.clone(),
             pool: grouping.pool,
-            lost: match grouping.lost {
-                LostArg::Excluded => LostAs::Nothing,
-                LostArg::AsFailure => LostAs::Failure,
-            },
+            lost: grouping.lost,
             ..Question::default()
         }
     }
@@ -100,17 +97,23 @@ pub struct GroupingArgs {
     #[arg(long)]
     pub pool: bool,
     /// How to count episodes that were lost because no answer came
-    #[arg(long, value_enum, default_value_t)]
-    pub lost: LostArg,
+    #[arg(long, value_parser = described(&LOST), default_value = LOST[0].1)]
+    pub lost: LostAs,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum LostArg {
-    /// Leave them out
-    #[default]
-    Excluded,
-    /// Count them as failures in each rate that every episode has
-    AsFailure,
+const LOST: [Described<LostAs>; 2] = [
+    (LostAs::Nothing, "excluded", "Leave them out"),
+    (LostAs::Failure, "as-failure", "Count them as failures in each rate that every episode has"),
+];
+
+/// A value, its name on the command line, and its words in the help.
+pub type Described<T> = (T, &'static str, &'static str);
+
+/// Parses the name of one of some values; the help has the words of each.
+pub fn described<T: Copy + Send + Sync + 'static>(all: &'static [Described<T>]) -> impl TypedValueParser<Value = T> {
+    let values = all.iter().map(|(_, name, words)| PossibleValue::new(*name).help(*words));
+    PossibleValuesParser::new(values)
+        .map(|typed: String| all.iter().find(|(_, name, _)| *name == typed).expect("only these names are possible").0)
 }
 
 /// Parses the name of one of some values.

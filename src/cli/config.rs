@@ -36,8 +36,8 @@ pub struct Setting {
 
 /// An option of a command.
 pub struct Choice<'a> {
-    command: String,
-    arg: &'a Arg,
+    pub command: String,
+    pub arg: &'a Arg,
 }
 
 /// The settings of the file that applies here, in its order; none without a file.

@@ -82,15 +82,14 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_file_with(path, |file| Ok(file.write_all(bytes)?))
 }
 
-/// Replaces a file by the output of `write`.
-pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T, Failure>) -> Result<T, Failure> {
+/// Replaces a file by the output of `write`; the new one is on the disk when this returns.
+pub fn write_file_with(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
     let mut file = create(path)?;
-    let written = write(file.as_file_mut()).map_err(|failure| match failure {
+    write(file.as_file_mut()).map_err(|failure| match failure {
         Failure::Output(error) => unwritable(path, error),
         other => other,
     })?;
-    commit(file, path)?;
-    Ok(written)
+    file.commit().map_err(|error| unwritable(path, error))
 }
 
 /// Replaces files of a folder together, by their paths inside it; other files stay.
@@ -108,11 +107,6 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
         let words = "help: is there a file of that name, and is the folder above it writable?";
         Failure::input(format!("cannot make the folder `{}`: {error}\n  {words}", folder.display()))
     })
-}
-
-/// Replaces the file at `path`; the new one is on the disk when this returns.
-pub fn commit(file: NewFile, path: &Path) -> Result<(), Failure> {
-    file.commit().map_err(|error| unwritable(path, error))
 }
 
 /// Refuses an output that is one of the files that the command reads.

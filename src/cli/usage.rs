@@ -3,6 +3,7 @@
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Error};
 
+use super::config;
 use mirrorstats_exact::suggest;
 
 /// Every feature, ordered by name; true if this build has it.
@@ -41,20 +42,10 @@ pub fn with_tips(mut error: Error, command: &Command) -> Error {
 
 fn of_others(option: &str, command: &Command) -> Option<String> {
     let long = option.strip_prefix("--")?.split('=').next()?;
-    let mut paths = Vec::new();
-    collect(command, "", long, &mut paths);
-    let paths: Vec<String> = paths.iter().map(|path| format!("`{path}`")).collect();
+    let choices = config::choices(command, "");
+    let having = choices.iter().filter(|choice| choice.arg.get_long() == Some(long));
+    let paths: Vec<String> = having.map(|choice| format!("`{}`", choice.command)).collect();
     (!paths.is_empty()).then(|| format!("`--{long}` is an option of {}", paths.join(", ")))
-}
-
-fn collect(command: &Command, path: &str, long: &str, found: &mut Vec<String>) {
-    for inner in command.get_subcommands() {
-        let path = format!("{path} {}", inner.get_name()).trim_start().to_owned();
-        if inner.get_arguments().any(|arg| arg.get_long() == Some(long)) {
-            found.push(path.clone());
-        }
-        collect(inner, &path, long, found);
-    }
 }
 
 fn of_feature(name: &str) -> Option<String> {

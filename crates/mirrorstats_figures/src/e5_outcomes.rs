@@ -15,22 +15,17 @@ const BAR: f64 = 15.0;
 const LEAST_WIDTH: f64 = 420.0;
 const PLOT_WIDTH: f64 = 260.0;
 
+/// The endings of episodes, each by its name and by its words in the legend: the final self-attribution is the body's
+/// colour, or another colour, or it is `unknown` or was never given.
+const ENDINGS: [[&str; 2]; 3] =
+    [["correct", "correct"], ["wrong", "wrong, committed"], ["uncommitted", "unknown or not committed"]];
+
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcomes {
     pub experiment: String,
-    /// One row per model; models without a row are shown as having no episodes.
-    pub rows: Vec<OutcomeRow>,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct OutcomeRow {
-    pub model: String,
-    /// Episodes whose final self-attribution is the body's colour.
-    pub correct: u64,
-    /// Episodes whose final self-attribution is another colour.
-    pub wrong: u64,
-    /// Episodes whose final self-attribution is `unknown`, or that never gave one.
-    pub uncommitted: u64,
+    /// The episodes of each model by their endings: correct, wrong, uncommitted. Models without a row are shown as
+    /// having no episodes.
+    pub rows: BTreeMap<String, [u64; 3]>,
 }
 
 impl Outcomes {
@@ -41,23 +36,27 @@ impl Outcomes {
     /// `answered`, which has one value per episode of the table, is true.
     pub fn from_table(episodes: &EpisodeTable, answered: &[bool]) -> Option<Self> {
         let (experiment, success) = open_question(episodes)?;
-        let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
+        let mut rows: BTreeMap<String, [u64; 3]> = BTreeMap::new();
         let all = episodes.keys.iter().zip(success.iter()).zip(answered);
         for ((key, value), answered) in all.filter(|((key, _), _)| key.experiment == experiment) {
-            let empty = || OutcomeRow { model: key.model.to_owned(), ..OutcomeRow::default() };
-            let row = rows.entry(key.model).or_insert_with(empty);
-            match (value, answered) {
-                (Some(1), _) => row.correct += 1,
-                (_, true) => row.wrong += 1,
-                (_, false) => row.uncommitted += 1,
-            }
+            let ending = match (value, answered) {
+                (Some(1), _) => 0,
+                (_, true) => 1,
+                (_, false) => 2,
+            };
+            rows.entry(key.model.to_owned()).or_default()[ending] += 1;
         }
-        (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows: rows.into_values().collect() })
+        (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows })
     }
 
     /// Returns true if there is any episode that [`from_table`](Self::from_table) would count.
     pub fn are_there(episodes: &EpisodeTable) -> bool {
         open_question(episodes).is_some()
+    }
+
+    /// The endings of a model that has episodes.
+    fn of(&self, model: &str) -> Option<[u64; 3]> {
+        self.rows.get(model).copied().filter(|counts| counts.iter().sum::<u64>() > 0)
     }
 }
 
@@ -70,20 +69,10 @@ fn open_question(episodes: &EpisodeTable) -> Option<(&str, &MetricColumn)> {
     })
 }
 
-impl OutcomeRow {
-    pub fn episodes(&self) -> u64 {
-        self.correct + self.wrong + self.uncommitted
-    }
-
-    fn parts(&self) -> [(&'static str, u64, Fill); 3] {
-        let outcome = &PALETTE.outcome;
-        let fill = |color| Fill::outlined(color, PALETTE.surface.paper, 0.8);
-        [
-            ("correct", self.correct, fill(outcome.correct)),
-            ("wrong", self.wrong, fill(outcome.wrong)),
-            ("uncommitted", self.uncommitted, fill(outcome.uncommitted)),
-        ]
-    }
+fn fills() -> [Fill; 3] {
+    let outcome = &PALETTE.outcome;
+    let fill = |color| Fill::outlined(color, PALETTE.surface.paper, 0.8);
+    [outcome.correct, outcome.wrong, outcome.uncommitted].map(fill)
 }
 
 pub(crate) fn draw(scene: Scene<'_>, outcomes: &Outcomes) -> Drawn {
@@ -99,28 +88,29 @@ pub(crate) fn draw(scene: Scene<'_>, outcomes: &Outcomes) -> Drawn {
     for (row, (model, label)) in names.iter().zip(&labels).enumerate() {
         let middle = MARGIN + ROW * (many(row) + 0.5);
         sheet.text((MARGIN, middle), label, lettering::label());
-        if let Some(found) = episodes_of(outcomes, model) {
-            bar(&mut sheet, &plot, &outcomes.experiment, found, middle);
+        if let Some(counts) = outcomes.of(model) {
+            bar(&mut sheet, &plot, [&outcomes.experiment, model], counts, middle);
         } else {
             empty_bar(&mut sheet, &plot, &outcomes.experiment, model, middle);
         }
     }
-    let has_all = names.iter().all(|model| episodes_of(outcomes, model).is_some());
+    let parts = ENDINGS.into_iter().zip(fills()).map(|([_, words], fill)| (Swatch::Tile(fill), words.to_owned()));
+    let has_all = names.iter().all(|model| outcomes.of(model).is_some());
     let empty = (!has_all).then(|| (Swatch::Empty, "no episodes".to_owned()));
-    let height = legend::draw_signs(&mut sheet, (MARGIN, frame.bottom() + 34.0), part_signs().chain(empty).collect());
+    let height = legend::draw_signs(&mut sheet, (MARGIN, frame.bottom() + 34.0), parts.chain(empty).collect());
     (sheet, height + MARGIN)
 }
 
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
-fn bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, row: &OutcomeRow, middle: f64) {
-    let episodes = row.episodes();
+fn bar(sheet: &mut Sheet, plot: &Plot, [experiment, model]: [&str; 2], counts: [u64; 3], middle: f64) {
+    let episodes: u64 = counts.iter().sum();
     let place = |count: u64| plot.x(count as f64 / episodes as f64);
     let mut before = 0;
-    for (name, count, fill) in row.parts() {
+    for (([name, _], fill), count) in ENDINGS.into_iter().zip(fills()).zip(counts) {
         let (from, to) = (place(before), place(before + count));
         before += count;
-        let title = format!("{experiment} · {} · {name}: {count} of {episodes}", row.model);
-        let mark = Mark::of_cell(title, experiment, &row.model, name).with("value", count).with("n", episodes);
+        let title = format!("{experiment} · {model} · {name}: {count} of {episodes}");
+        let mark = Mark::of_cell(title, experiment, model, name).with("value", count).with("n", episodes);
         sheet.mark(&mark, |sheet| {
             if count == 0 {
                 return;
@@ -142,14 +132,4 @@ fn empty_bar(sheet: &mut Sheet, plot: &Plot, experiment: &str, model: &str, midd
     let mark = mark.with("experiment", experiment).with("model", model).with("n", 0);
     let place = Frame::new(plot.frame.left, middle - BAR / 2.0, plot.frame.width, BAR);
     sheet.mark(&mark, |sheet| tiles::empty(sheet, place));
-}
-
-fn episodes_of<'a>(outcomes: &'a Outcomes, model: &str) -> Option<&'a OutcomeRow> {
-    outcomes.rows.iter().find(|row| row.model == model).filter(|row| row.episodes() > 0)
-}
-
-fn part_signs() -> impl Iterator<Item = (Swatch, String)> {
-    let words = ["correct", "wrong, committed", "unknown or not committed"];
-    let parts = OutcomeRow::default().parts().into_iter().zip(words);
-    parts.map(|((_, _, fill), text)| (Swatch::Tile(fill), text.to_owned()))
 }

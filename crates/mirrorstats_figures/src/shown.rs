@@ -16,27 +16,16 @@ use mirrorstats_metric::catalogs::relations::Relations;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum FigureName {
-    /// Behavioural profiles: one radar per experiment, one line per model.
     Spider,
-    /// Models by experiments and metrics, coloured by goodness.
     Heatmap,
-    /// Task success against self-attribution.
     Scatter,
-    /// Completion-conditioned success minus success.
     CompletionGap,
-    /// Final self-identification of the open-ended experiment.
     E5Outcomes,
-    /// Task success with its interval and the level of chance.
     Intervals,
-    /// Differences between models, and between experiments, with intervals and verdicts.
     Forest,
-    /// Task success from the first experiment to every other.
     Slopes,
-    /// Task success against the dose of a factor.
     DoseResponse,
-    /// The share of episodes decided by step t.
     DecisionCurve,
-    /// The mirror's time in view, per episode.
     Gaze,
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use mirrorstats_report::bundle::Output;
 use mirrorstats_trace::read::open::TraceSet;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::PublishError;
 use crate::manifest::{Settings, list, output_of};
@@ -15,8 +15,12 @@ use crate::sources::TRACES;
 
 pub(crate) const NAME: &str = "croissant.json";
 
-/// The context of Croissant 1.0.
-const CONTEXT: &str = include_str!("../../../assets/publish/croissant-context.json");
+/// The metadata of every data set in the order of its keys, with the words for what the author leaves open.
+const TEMPLATE: &str = include_str!("../../../assets/publish/croissant.json");
+const PEOPLE: &str =
+    "Answers of people under codes. Names and links are not in the data. People who declined or withdrew are left out.";
+const GENERATED_BY: &str =
+    concat!("mirrorstats ", env!("CARGO_PKG_VERSION"), ": `experiments/`, `world/` and `prompts/` have the settings.");
 
 /// The files that a bundle is made from.
 const SOURCES: [&str; 4] = [TRACES, "definitions", "styles", "prompts"];
@@ -37,57 +41,33 @@ pub(crate) fn stated(text: &[u8]) -> Vec<(String, String)> {
 
 pub(crate) fn text(base: &Path, settings: &Settings, traces: &TraceSet) -> Result<String, PublishError> {
     let about = &settings.about;
-    let has_people = traces.files().iter().any(|file| file.declares("participant"));
     let is_recorded = traces.files().iter().any(|file| file.recording()["world"].is_object());
-    let or = |given: &Option<String>, default: &str| Value::from(given.as_deref().unwrap_or(default));
-    let people = "Answers of people under codes. Names and links are not in the data. People who declined or withdrew are left out.";
-    let nobody = "None: no person took part.";
-    let context: Value = serde_json::from_str(CONTEXT).expect("the context is constant and tested");
-    let mut root = Map::new();
-    for (key, value) in [
-        ("@context", context),
-        ("@type", "sc:Dataset".into()),
-        ("name", about.title().into()),
-        ("description", about.description().into()),
-        ("conformsTo", json!(["http://mlcommons.org/croissant/1.0", "http://mlcommons.org/croissant/RAI/1.0"])),
-        ("license", or(&about.license, "unknown")),
-        ("url", or(&about.url, "https://huggingface.co/datasets")),
-        ("creator", about.authors.iter().map(|name| json!({"@type": "sc:Person", "name": name})).collect()),
-        (
-            "rai:dataLimitations",
-            or(
-                &about.limitations,
-                "Scores hold for these models, prompts and scenes. `report/` names what the data cannot show.",
-            ),
-        ),
-        ("rai:dataBiases", or(&about.biases, "Not examined.")),
-        ("rai:personalSensitiveInformation", or(&about.personal, if has_people { people } else { nobody })),
-        (
-            "rai:dataUseCases",
-            or(
-                &about.uses,
-                "Evaluation and comparison of agents. Not for training: a model trained on it can no longer be evaluated with it.",
-            ),
-        ),
-        ("rai:dataSocialImpact", or(&about.impact, "Not examined.")),
-        ("rai:hasSyntheticData", about.synthetic.unwrap_or(is_recorded).into()),
-        ("prov:wasDerivedFrom", about.derived_from.iter().map(|from| json!({"@id": from})).collect()),
-        (
-            "prov:wasGeneratedBy",
-            or(
-                &about.generated_by,
-                concat!(
-                    "mirrorstats ",
-                    env!("CARGO_PKG_VERSION"),
-                    ": `experiments/`, `world/` and `prompts/` have the settings."
-                ),
-            ),
-        ),
-        ("distribution", sources(base)?.iter().map(file_object).collect()),
-    ] {
-        root.insert(key.to_owned(), value);
+    let mut root: Value = serde_json::from_str(TEMPLATE).expect("the template is constant and tested");
+    root["name"] = about.title().into();
+    root["description"] = about.description().into();
+    root["creator"] = about.authors.iter().map(|name| json!({"@type": "sc:Person", "name": name})).collect();
+    if traces.files().iter().any(|file| file.declares("participant")) {
+        root["rai:personalSensitiveInformation"] = PEOPLE.into();
     }
-    Ok(serde_json::to_string_pretty(&root).expect("a map of JSON values") + "\n")
+    root["rai:hasSyntheticData"] = about.synthetic.unwrap_or(is_recorded).into();
+    root["prov:wasDerivedFrom"] = about.derived_from.iter().map(|from| json!({"@id": from})).collect();
+    root["prov:wasGeneratedBy"] = GENERATED_BY.into();
+    root["distribution"] = sources(base)?.iter().map(file_object).collect();
+    for (key, stated) in [
+        ("license", &about.license),
+        ("url", &about.url),
+        ("rai:dataLimitations", &about.limitations),
+        ("rai:dataBiases", &about.biases),
+        ("rai:personalSensitiveInformation", &about.personal),
+        ("rai:dataUseCases", &about.uses),
+        ("rai:dataSocialImpact", &about.impact),
+        ("prov:wasGeneratedBy", &about.generated_by),
+    ] {
+        if let Some(words) = stated {
+            root[key] = words.as_str().into();
+        }
+    }
+    Ok(serde_json::to_string_pretty(&root).expect("a tree of JSON values") + "\n")
 }
 
 fn file_object(file: &Output) -> Value {

@@ -96,7 +96,8 @@ pub(crate) fn derive(
         coder: None,
         threads,
     };
-    export::write(&options, &out.join("viewer"), &|done, all| progress(&format!("viewer: {done} of {all} episodes")))?;
+    let shown = |done, all| progress(&format!("viewer: {done} of {all} episodes"));
+    export::write(&options, &out.join("viewer"), &shown).map_err(|error| PublishError::Refused(error.to_string()))?;
     notes.extend(report.notes.clone());
     let episodes = report.results.episodes.len();
     let pairs = pairs(&study)?.map(|pairs| pairs.to_string());

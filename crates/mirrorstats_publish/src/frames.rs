@@ -231,7 +231,10 @@ fn write_table(
         }
         let writer = match &mut writer {
             Some(writer) => writer,
-            None => writer.insert(create(path, &schema)?.map_err(failed)?),
+            None => {
+                let file = File::create(path).map_err(PublishError::file(path))?;
+                writer.insert(ArrowWriter::try_new_with_options(file, Arc::clone(&schema), options()).map_err(failed)?)
+            }
         };
         writer.write(&batch(&schema, episode, &rows).map_err(|error| failed(error.into()))?).map_err(failed)?;
     }
@@ -248,18 +251,14 @@ fn write_table(
     Ok(is_written)
 }
 
-type Created = Result<ArrowWriter<File>, ParquetError>;
-
-fn create(path: &Path, schema: &Arc<Schema>) -> Result<Created, PublishError> {
+fn options() -> ArrowWriterOptions {
     let properties = WriterProperties::builder()
         .set_created_by(concat!("mirrorstats version ", env!("CARGO_PKG_VERSION")).to_owned())
         .set_key_value_metadata(Some(vec![KeyValue::new("huggingface".to_owned(), features().to_string())]))
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_dictionary_enabled(false)
         .build();
-    let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
-    let file = File::create(path).map_err(PublishError::file(path))?;
-    Ok(ArrowWriter::try_new_with_options(file, Arc::clone(schema), options))
+    ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true)
 }
 
 type Row = (i32, Option<&'static str>, Vec<u8>);

@@ -30,16 +30,13 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use mirrorstats_exact::replace::{
-    Content, FolderError, FolderFiles, FolderHoldsInput, TemporaryFolder, check_folder, folder_of, make_folder,
-    replace_folder,
+    Content, FolderError, FolderFiles, TemporaryFolder, folder_of, make_folder, replace_folder,
 };
 use mirrorstats_log::LogError;
 use mirrorstats_report::bundle::MANIFEST;
-use mirrorstats_study::provenance::ProvenanceError;
 use mirrorstats_study::{Study, StudyError};
 use mirrorstats_trace::beside::ListError;
 use mirrorstats_trace::error::TraceError;
-use mirrorstats_view::ViewError;
 
 use about::About;
 use manifest::Settings;
@@ -49,30 +46,18 @@ pub use manifest::{Frames, Manifest, Withheld};
 pub enum PublishError {
     #[error(transparent)]
     Study(#[from] StudyError),
-    #[error("{0}")]
-    View(Box<ViewError>),
     #[error(transparent)]
     Trace(#[from] TraceError),
     #[error(transparent)]
     List(#[from] ListError),
     #[error(transparent)]
     Log(#[from] LogError),
-    #[error(transparent)]
-    Provenance(#[from] ProvenanceError),
-    #[error(transparent)]
-    Folder(#[from] FolderHoldsInput),
     #[error("cannot write the bundle: {0}\n  help: is the folder there and writable, and the disk not full?")]
     Write(#[from] FolderError),
     #[error("{}: {source}", path.display())]
     File { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Refused(String),
-}
-
-impl From<ViewError> for PublishError {
-    fn from(error: ViewError) -> Self {
-        Self::View(Box::new(error))
-    }
 }
 
 impl PublishError {
@@ -109,10 +94,9 @@ pub struct Published {
 /// Writes the bundle of a study: the folder appears whole or not at all.
 pub fn publish(study: &Study, request: &PublishRequest, progress: Progress<'_>) -> Result<Published, PublishError> {
     let traces = study.traces()?;
-    let read: Vec<PathBuf> = traces.files().iter().map(|file| file.path().to_owned()).collect();
     let out = &request.out;
     check_out(out)?;
-    check_folder(out, &read)?;
+    study.check_out(out)?;
     let parent = folder_of(out);
     make_folder(parent).map_err(PublishError::file(parent))?;
     let name = out.file_name().unwrap_or_default().to_string_lossy();
@@ -155,14 +139,17 @@ pub(crate) fn put(stage: &Path, out: &Path, files: &[String], index: Option<&str
 
 /// Accepts a new folder, an empty one, or an earlier bundle.
 fn check_out(out: &Path) -> Result<(), PublishError> {
-    let is_empty = fs::read_dir(out).map_or(!out.exists(), |mut entries| entries.next().is_none());
-    if is_empty || manifest::read(out).is_ok() {
+    if is_empty(out) || manifest::read(out).is_ok() {
         return Ok(());
     }
     Err(PublishError::Refused(format!(
         "--out: expected a new folder or an earlier bundle, found other files in `{}`\n  help: name another folder",
         out.display()
     )))
+}
+
+pub(crate) fn is_empty(folder: &Path) -> bool {
+    fs::read_dir(folder).map_or(!folder.exists(), |mut entries| entries.next().is_none())
 }
 
 fn old_files(folder: &Path) -> Vec<PathBuf> {

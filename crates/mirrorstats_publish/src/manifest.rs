@@ -1,6 +1,6 @@
 //! The manifest of a bundle: settings, withheld parts, and the hash of every file.
 
-use std::fs;
+use std::io;
 use std::path::Path;
 
 use mirrorstats_exact::budget::Limit;
@@ -10,6 +10,7 @@ use mirrorstats_metric::file;
 use mirrorstats_report::bundle::{MANIFEST, Output};
 use mirrorstats_report::style;
 use mirrorstats_study::provenance::is_plain;
+use mirrorstats_study::verify::entries;
 use mirrorstats_trace::schema::SCHEMA_VERSION;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -88,11 +89,9 @@ pub struct Manifest {
 impl Manifest {
     pub(crate) fn of_folder(base: &Path, settings: Settings, episodes: usize) -> Result<Self, PublishError> {
         let outputs = list(base)?.into_iter().map(|path| output_of(base, path)).collect::<Result<_, _>>()?;
-        let version = env!("CARGO_PKG_VERSION").to_owned();
-        let format = FORMAT.to_owned();
         let manifest = Self {
-            format,
-            version,
+            format: FORMAT.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
             schema_version: SCHEMA_VERSION,
             episodes,
             settings,
@@ -164,27 +163,16 @@ pub(crate) fn read(folder: &Path) -> Result<Manifest, PublishError> {
 
 /// The files of a folder without its manifest, by path, `/` between their parts.
 pub(crate) fn list(base: &Path) -> Result<Vec<String>, PublishError> {
-    let (mut found, mut open) = (Vec::new(), vec![String::new()]);
-    while let Some(inside) = open.pop() {
-        let folder = base.join(&inside);
-        for entry in fs::read_dir(&folder).map_err(PublishError::file(&folder))? {
-            let entry = entry.map_err(PublishError::file(&folder))?;
-            let path = format!("{inside}{}", entry.file_name().to_string_lossy());
-            if entry.file_type().map_err(PublishError::file(&folder))?.is_dir() {
-                open.push(path + "/");
-            } else if path != MANIFEST {
-                found.push(path);
-            }
-        }
-    }
-    found.sort();
-    Ok(found)
+    let found = entries(base).map_err(|(path, source)| PublishError::File { path, source })?;
+    Ok(found.into_keys().filter(|path| path != MANIFEST).collect())
 }
 
 pub(crate) fn output_of(base: &Path, path: String) -> Result<Output, PublishError> {
     let at = base.join(&path);
-    let file = input::open(&at).map_err(PublishError::file(&at))?;
-    let bytes = file.metadata().map_err(PublishError::file(&at))?.len();
-    let sha256 = hash::of_reader(file).map_err(PublishError::file(&at))?;
+    let read = || -> io::Result<_> {
+        let file = input::open(&at)?;
+        Ok((file.metadata()?.len(), hash::of_reader(file)?))
+    };
+    let (bytes, sha256) = read().map_err(PublishError::file(&at))?;
     Ok(Output { path, sha256, bytes })
 }

@@ -8,6 +8,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::format::counted;
 use mirrorstats_exact::replace::{folder_of, make_folder};
 use mirrorstats_exact::{hash, input};
 use mirrorstats_experiment::prompt::Templates;
@@ -70,13 +71,10 @@ pub(crate) fn copy_traces(
     let labels = folder.join("labels.jsonl");
     labels::remove(&labels, &gone)?;
     if !gone.is_empty() {
-        notes.push(format!("{} of people who declined or withdrew are not in the bundle", episodes(gone.len())));
+        let episodes = counted(gone.len() as u64, "episode");
+        notes.push(format!("{episodes} of people who declined or withdrew are not in the bundle"));
     }
     Ok(withheld.into_iter().collect())
-}
-
-fn episodes(count: usize) -> String {
-    mirrorstats_exact::format::counted(count as u64, "episode")
 }
 
 /// The file's own name, or the first free one with a number.

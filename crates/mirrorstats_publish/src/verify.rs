@@ -23,7 +23,8 @@ use crate::{Progress, PublishError, croissant, derive};
 pub fn verify(folder: &Path, threads: NonZeroUsize, progress: Progress<'_>) -> Result<Verification, PublishError> {
     progress("hashes");
     let of_manifest = |found: String| {
-        let difference = changed(MANIFEST, None, "the manifest as `mirrorstats publish` wrote it", &found);
+        let difference =
+            Difference::new(MANIFEST, Kind::Changed, "the manifest as `mirrorstats publish` wrote it", found);
         Verification { differences: vec![difference], ..Verification::default() }
     };
     let (manifest, text) = match read_text(folder) {
@@ -43,11 +44,6 @@ pub fn verify(folder: &Path, threads: NonZeroUsize, progress: Progress<'_>) -> R
     Ok(found)
 }
 
-fn changed(path: &str, cell: Option<String>, expected: &str, found: &str) -> Difference {
-    let (expected, found) = (expected.to_owned(), found.to_owned());
-    Difference { path: path.to_owned(), kind: Kind::Changed, cell, expected, found }
-}
-
 /// Compares the sources with the hashes in `croissant.json`.
 fn add_second_record(folder: &Path, found: &mut Verification) -> Result<(), PublishError> {
     let text = std::fs::read(folder.join(croissant::NAME)).unwrap_or_default();
@@ -56,10 +52,7 @@ fn add_second_record(folder: &Path, found: &mut Verification) -> Result<(), Publ
     for path in stated.keys().filter(|path| sources.iter().all(|source| source.path != **path)) {
         if found.differences.iter().all(|difference| difference.path != *path) {
             let expected = format!("the source that {} states", croissant::NAME);
-            let found_here = "no such file".to_owned();
-            let difference =
-                Difference { path: path.clone(), kind: Kind::Missing, cell: None, expected, found: found_here };
-            found.differences.push(difference);
+            found.differences.push(Difference::new(path, Kind::Missing, expected, "no such file"));
         }
     }
     for source in sources {
@@ -67,7 +60,8 @@ fn add_second_record(folder: &Path, found: &mut Verification) -> Result<(), Publ
         let stated = stated.get(&source.path).map_or("no such file", String::as_str);
         if !known && stated != source.sha256 {
             let expected = format!("the SHA-256 {stated}, as {} states", croissant::NAME);
-            found.differences.push(changed(&source.path, None, &expected, &format!("the SHA-256 {}", source.sha256)));
+            let found_here = format!("the SHA-256 {}", source.sha256);
+            found.differences.push(Difference::new(source.path, Kind::Changed, expected, found_here));
         }
     }
     Ok(())
@@ -96,8 +90,8 @@ fn add_recomputed(
             // Damage that the hashes show explains the failure.
             if found.holds() {
                 let words = error.to_string();
-                let path = blamed(&base, &words)?;
-                found.differences.push(changed(&path, None, "a file from which the rest can be made again", &words));
+                let expected = "a file from which the rest can be made again";
+                found.differences.push(Difference::new(blamed(&base, &words)?, Kind::Changed, expected, words));
             } else {
                 found.notes.push(format!("nothing was computed again: {error}"));
             }
@@ -120,17 +114,15 @@ fn add_recomputed(
         if published.is_file() && (is_own_version || is_data) {
             found.differences.extend(compare(&published, &new, path)?);
         } else if !published.is_file() && !known.contains(path) {
-            let expected = "the file that the sources give".to_owned();
-            let kind = Kind::Missing;
-            let found_here = "no such file".to_owned();
-            found.differences.push(Difference { path: path.clone(), kind, cell: None, expected, found: found_here });
+            let expected = "the file that the sources give";
+            found.differences.push(Difference::new(path, Kind::Missing, expected, "no such file"));
         }
     }
     let expected: BTreeSet<String> =
         made.into_iter().chain(croissant::sources(&base)?.into_iter().map(|file| file.path)).collect();
     for path in list(&base)?.into_iter().filter(|path| !expected.contains(path) && !known.contains(path)) {
-        let (expected, found_here) = ("no such file".to_owned(), "a file that the sources do not give".to_owned());
-        found.differences.push(Difference { path, kind: Kind::Unexpected, cell: None, expected, found: found_here });
+        let found_here = "a file that the sources do not give";
+        found.differences.push(Difference::new(path, Kind::Unexpected, "no such file", found_here));
     }
     Ok(())
 }
@@ -145,10 +137,11 @@ fn add_findings(
     let definitions = derive::question(base, &manifest.settings).definitions;
     for finding in findings(definitions.as_deref(), &derive::inputs(base)?, threads)?.findings {
         if finding.severity == Severity::Error {
-            let at = [finding.episode.clone(), finding.t.map(|t| format!("t = {t}")), finding.column.clone()];
+            let at = [finding.episode, finding.t.map(|t| format!("t = {t}")), finding.column];
             let cell: Vec<String> = at.into_iter().flatten().collect();
             let cell = (!cell.is_empty()).then(|| cell.join(", "));
-            found.differences.push(changed(&finding.file, cell, &finding.expected, &finding.found));
+            let difference = Difference::new(finding.file, Kind::Changed, finding.expected, finding.found);
+            found.differences.push(Difference { cell, ..difference });
         }
     }
     Ok(())

@@ -7,9 +7,11 @@ use serde::Serialize;
 
 use crate::{Study, StudyError};
 use mirrorstats_exact::budget::Limit;
+use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_statistics::agreement::{FEWEST, Kappa};
 use mirrorstats_statistics::comparisons::paired::Pairs;
 use mirrorstats_statistics::intervals::interval::Interval;
+use mirrorstats_tables::Table;
 
 /// The labels of some traces and how far coders agree.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -158,4 +160,55 @@ fn compared(first: &Coded<'_>, second: &Coded<'_>, words: &BTreeSet<&str>) -> Ve
         Pairs { neither: n - counts.n(), ..counts }
     };
     words.iter().map(whole).collect()
+}
+
+impl LabelAgreement {
+    /// The labels and the agreement as text.
+    pub fn render(&self, width: Option<usize>) -> String {
+        let mut parts = vec![format!("{} of {} coded\n", self.coded, counted(self.episodes, "episode"))];
+        if self.elsewhere > 0 {
+            let elsewhere = counted(self.elsewhere, "episode");
+            parts.push(format!("{elsewhere} more coded, which the traces lack or --where leaves out\n"));
+        }
+        let coders = self.coders.iter().map(|coder| [coder.coder.clone(), coder.episodes.to_string()]);
+        let labels = self.labels.iter().map(|label| [label.label.clone(), label.episodes.to_string()]);
+        for (title, table) in [
+            ("", Table::of_texts(["coder", "episodes"]).aligned_right([1]).with(coders)),
+            ("", Table::of_texts(["label", "episodes"]).aligned_right([1]).with(labels)),
+            ("agreement of two coders\n", pairs(&self.agreement)),
+        ] {
+            if !table.is_empty() {
+                parts.push(format!("\n{title}{}", table.within(width)));
+            }
+        }
+        if self.coders.len() == 1 {
+            parts.push("\nOne coder: agreement needs a second one on the same episodes.\n".to_owned());
+        }
+        parts.concat()
+    }
+}
+
+fn pairs(pairs: &[PairAgreement]) -> Table {
+    let header =
+        ["label", "coders", "n", "both", "first only", "second only", "neither", "agree", "kappa", "95 % interval"];
+    let rows = pairs.iter().map(|pair| {
+        let counts = pair.counts;
+        let shown = pair
+            .interval
+            .map(|interval| format!("[{}, {}]", fixed(Some(interval.low), 2), fixed(Some(interval.high), 2)));
+        let why = pair.cannot_say.as_ref().map(|why| format!("cannot say: {why}"));
+        [
+            pair.label.clone(),
+            pair.coders.join(", "),
+            pair.n.to_string(),
+            counts.both.to_string(),
+            counts.first_only.to_string(),
+            counts.second_only.to_string(),
+            counts.neither.to_string(),
+            fixed(pair.agreement, 2),
+            fixed(pair.kappa, 2),
+            shown.or(why).unwrap_or_default(),
+        ]
+    });
+    Table::of_texts(header).aligned_right(2..=8).with(rows)
 }

@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use crate::question::add_new;
 use crate::{Study, StudyError};
 use mirrorstats_analysis::comparable::{BODY_COLOR, FINGERPRINT, ORIGIN, REPETITION, divide_scenes_by_color};
 use mirrorstats_exact::hash;
@@ -16,11 +17,7 @@ const DIGITS: usize = 8;
 
 /// Adds the labels that the audit reads.
 pub(crate) fn add_labels(labels: &mut Vec<String>, traces: &TraceSet) {
-    for name in LABELS.into_iter().filter(|name| traces.declares(name)) {
-        if !labels.iter().any(|label| label == name) {
-            labels.push(name.to_owned());
-        }
-    }
+    add_new(labels, LABELS.into_iter().filter(|name| traces.declares(name)));
 }
 
 /// Declares the settings of each episode by the content of its file.

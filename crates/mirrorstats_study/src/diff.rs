@@ -9,11 +9,10 @@ use std::io;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use crate::error::kinds;
 use crate::inputs::{ScoreFile, Source, Stamp};
 use crate::own_definitions::{NotScored, unscored};
 use crate::question::Question;
-use crate::{Study, StudyError, scores};
+use crate::{ErrorKind, Study, StudyError, scores};
 use mirrorstats_analysis::changes::{Changes, Flip, Overlap};
 use mirrorstats_metric::definitions::{Definitions, UnknownMetric};
 use mirrorstats_report::layout::TableOrder;
@@ -26,22 +25,6 @@ use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::{flips, vocabulary};
 use mirrorstats_trace::inputs::{self, Input};
 use mirrorstats_trace::read::open::TraceSet;
-
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum DiffError {
-    #[error(
-        "`{name}` are definitions: expected traces to score with them, found none\n  \
-         help: name the traces after OLD and NEW"
-    )]
-    NoTraces { name: String },
-    #[error(
-        "{argument}: expected definitions, scores or a report's folder, found no scores in it\n  \
-         help: OLD and NEW come first, the traces after them"
-    )]
-    NoSide { argument: String },
-}
-
-kinds! { Input: DiffError; }
 
 /// One side of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -172,7 +155,12 @@ impl Side {
         match ScoreFile::all(&inputs)? {
             Some(scores) => Ok(Self::Scores(scores)),
             None if path.is_dir() || (path.extension() == Some(OsStr::new("parquet")) && path.exists()) => {
-                Err(DiffError::NoSide { argument: path.display().to_string() }.into())
+                let argument = path.display();
+                let words = format!(
+                    "{argument}: expected definitions, scores or a report's folder, found no scores in it\n  \
+                     help: OLD and NEW come first, the traces after them"
+                );
+                Err(StudyError::new(ErrorKind::Input, words))
             }
             None => Ok(Self::Definitions(path.to_owned())),
         }
@@ -228,7 +216,10 @@ impl Side {
         request: &DiffRequest,
     ) -> Result<Option<(Definitions, &'t TraceSet)>, StudyError> {
         let Self::Definitions(name) = self else { return Ok(None) };
-        let traces = traces.ok_or_else(|| DiffError::NoTraces { name: name.display().to_string() })?;
+        let traces = traces.ok_or_else(|| {
+            let words = "expected traces to score with them, found none\n  help: name the traces after OLD and NEW";
+            StudyError::new(ErrorKind::Input, format!("`{}` are definitions: {words}", name.display()))
+        })?;
         let question = Question { metrics: Some(metrics.to_vec()), ..self.question(request) };
         Ok(Some((question.bind(traces)?, traces)))
     }

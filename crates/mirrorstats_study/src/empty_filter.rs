@@ -7,7 +7,6 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::num::NonZeroUsize;
 
-use crate::error::kinds;
 use crate::inputs::Source;
 use crate::question::Question;
 use crate::{StudyError, scores};
@@ -20,14 +19,6 @@ use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_score::{score_traces, vocabulary};
 
 const LISTED: usize = 8;
-
-#[derive(Debug, thiserror::Error)]
-#[error("{words}\n  help: give a filter that holds for some of them, or none")]
-pub(crate) struct EmptyFilter {
-    pub words: String,
-}
-
-kinds! { Argument: EmptyFilter; }
 
 /// The explanation of a filter that keeps no episode; `None` without a filter.
 pub(crate) fn explained(

@@ -6,11 +6,10 @@ use std::slice;
 
 use crate::caveats::{design_of, selection};
 use crate::copies::{copies, suspected};
-use crate::error::kinds;
 use crate::inputs::Source;
 use crate::limits::check_verdicts;
 use crate::results::{Outputs, Results};
-use crate::{Study, StudyError, pooled};
+use crate::{ErrorKind, Study, StudyError, pooled};
 use mirrorstats_analysis::gate::{FlippedPair, Gate, GateOptions, Played};
 use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::{Better, Metric};
@@ -19,16 +18,6 @@ use mirrorstats_score::evidence;
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::inputs::{self, Input};
 use mirrorstats_trace::read::open::TraceSet;
-
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "{metric}: expected a metric with `better = \"higher\"` or \"lower\", found none\n  help: name another metric with --metric"
-)]
-pub(crate) struct NoDirection {
-    metric: String,
-}
-
-kinds! { Argument: NoDirection; }
 
 type OfSide = fn(&mut FlippedPair) -> &mut Played;
 
@@ -79,7 +68,12 @@ pub fn leading_metric(study: &Study) -> Result<String, StudyError> {
     };
     let found = catalog.metric.iter().find(|(_, metric)| metric.better != Better::Neither);
     let first = || catalog.metric.keys().next().cloned().unwrap_or_default();
-    found.map(|(name, _)| name.clone()).ok_or_else(|| NoDirection { metric: first() }.into())
+    found.map(|(name, _)| name.clone()).ok_or_else(|| no_direction(&first()))
+}
+
+fn no_direction(metric: &str) -> StudyError {
+    let expected = "expected a metric with `better = \"higher\"` or \"lower\", found none";
+    StudyError::new(ErrorKind::Argument, format!("{metric}: {expected}\n  help: name another metric with --metric"))
 }
 
 fn gated(study: &Study, options: &GateOptions) -> Result<Results, StudyError> {
@@ -88,7 +82,7 @@ fn gated(study: &Study, options: &GateOptions) -> Result<Results, StudyError> {
     study.check_filter(table.len())?;
     check_verdicts(table)?;
     if check_metric(table, &options.metric)?.better == Better::Neither {
-        return Err(NoDirection { metric: options.metric.clone() }.into());
+        return Err(no_direction(&options.metric));
     }
     if !options.pool {
         pooled::check(table, &study.question.by_over(table))?;

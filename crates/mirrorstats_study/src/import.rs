@@ -8,11 +8,11 @@ use std::{fmt, slice};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::StudyError;
 use crate::error::kinds;
 use crate::findings::ExpectedTraces;
 use crate::inputs::{InputError, ScoreFile};
 use crate::own_definitions::DEFAULT_DEFINITIONS;
+use crate::{ErrorKind, StudyError};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::counted;
@@ -33,14 +33,7 @@ const LARGEST: Limit = Limit::new("bytes of a palette or of definitions", 1 << 2
 /// The bytes of a file that tell whether it is a log.
 const HEAD: u64 = 64 << 10;
 
-#[derive(Debug, thiserror::Error)]
-#[error("--palette {typed}: {words}")]
-pub(crate) struct PaletteError {
-    typed: String,
-    words: String,
-}
-
-kinds! { Argument: PaletteError; Definitions: MappingError; }
+kinds! { Definitions: MappingError; }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
@@ -199,12 +192,12 @@ fn is_log(input: &Input, has_mapping: bool) -> bool {
 }
 
 /// The palette in an argument or in the file that it names. A text with a comma is never a file name.
-fn palette(path: &Path) -> Result<Palette, PaletteError> {
+fn palette(path: &Path) -> Result<Palette, StudyError> {
     let typed = path.to_string_lossy();
     if typed == "default" {
         return Ok(Palette::of_study());
     }
-    let failed = |words: String| PaletteError { typed: typed.clone().into_owned(), words };
+    let failed = |words: String| StudyError::new(ErrorKind::Argument, format!("--palette {typed}: {words}"));
     let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || path.is_file());
     let names = if is_file {
         Cow::Owned(input::text(path, LARGEST).map_err(|error| failed(format!("cannot read it: {error}")))?)

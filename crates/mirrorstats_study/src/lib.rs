@@ -21,8 +21,6 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod agreement;
-mod agreement_text;
-pub mod audit;
 mod caveats;
 pub mod contents;
 mod copies;
@@ -62,6 +60,5 @@ mod study;
 mod tables;
 pub mod verify;
 
-pub use agreement_text::agreement_text;
 pub use error::{ErrorKind, StudyError};
 pub use study::Study;

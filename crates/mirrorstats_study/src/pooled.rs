@@ -5,26 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::StudyError;
-use crate::error::kinds;
+use crate::{ErrorKind, StudyError};
 use mirrorstats_analysis::comparable::{FINGERPRINT, ORIGIN, Recorded, Varied, difference};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_score::cells::group::{GroupError, membership};
 use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, TextColumn};
-
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "{cell}: expected episodes that were recorded alike, found {counts}: {differences}; for example {episodes}\n  help: {help}"
-)]
-pub(crate) struct PooledError {
-    cell: String,
-    episodes: String,
-    counts: String,
-    differences: String,
-    help: String,
-}
-
-kinds! { Input: PooledError; }
 
 fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {
     let settings: Vec<&TextColumn> = [FINGERPRINT, ORIGIN].into_iter().filter_map(|name| table.label(name)).collect();
@@ -45,7 +30,7 @@ fn mixed(table: &EpisodeTable, groups: &[usize]) -> Vec<[usize; 2]> {
 pub(crate) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyError> {
     let groups = membership(table, by)?;
     match mixed(table, &groups).first() {
-        Some(rows) => Err(pooled(table, by, &groups, *rows).into()),
+        Some(rows) => Err(StudyError::new(ErrorKind::Input, pooled(table, by, &groups, *rows))),
         None => Ok(()),
     }
 }
@@ -70,7 +55,8 @@ fn differences(table: &EpisodeTable, rows: [usize; 2]) -> String {
     }
 }
 
-fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2]) -> PooledError {
+/// The refusal of a cell by two of its rows.
+fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2]) -> String {
     let [one, other] = rows.map(|row| table.keys.get(row));
     let fingerprint = |row: usize| table.label(FINGERPRINT).and_then(|column| column.get(row)).unwrap_or_default();
     let is_in_cell = |row: usize| {
@@ -91,13 +77,13 @@ fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2
         help
     };
     let kept = rows.map(fingerprint).into_iter().find(|name| !name.is_empty()).unwrap_or_default();
-    PooledError {
-        cell: format!("{}, {}", visible(one.experiment), visible(one.model)),
-        episodes: format!("`{}` and `{}`", visible(one.episode_id), visible(other.episode_id)),
-        counts: counts.join(", "),
-        differences: differences(table, rows),
-        help: format!("{help}; --where \"fingerprint = '{kept}'\" keeps some of them, --pool takes all"),
-    }
+    let (experiment, model) = (visible(one.experiment), visible(one.model));
+    let (counts, differences) = (counts.join(", "), differences(table, rows));
+    let (first, second) = (visible(one.episode_id), visible(other.episode_id));
+    format!(
+        "{experiment}, {model}: expected episodes that were recorded alike, found {counts}: {differences}; for example \
+         `{first}` and `{second}`\n  help: {help}; --where \"fingerprint = '{kept}'\" keeps some of them, --pool takes all"
+    )
 }
 
 fn name_of(fingerprint: &str) -> String {

@@ -54,11 +54,7 @@ impl Question {
     pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
         let mut labels = self.labels();
         let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
-        for name in standing.chain(traces.label_columns().iter().map(String::as_str)) {
-            if !labels.iter().any(|label| label == name) {
-                labels.push(name.to_owned());
-            }
-        }
+        add_new(&mut labels, standing.chain(traces.label_columns().iter().map(String::as_str)));
         labels
     }
 
@@ -119,5 +115,14 @@ impl Question {
             definitions.select(metrics)?;
         }
         Ok(definitions)
+    }
+}
+
+/// Adds the names that a list lacks.
+pub(crate) fn add_new<'n>(list: &mut Vec<String>, names: impl Iterator<Item = &'n str>) {
+    for name in names {
+        if !list.iter().any(|known| known == name) {
+            list.push(name.to_owned());
+        }
     }
 }

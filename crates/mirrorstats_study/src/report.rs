@@ -7,7 +7,6 @@ use std::thread;
 use crate::caveats::{departed, selection};
 use crate::copies::copies;
 use crate::design::remove_labels;
-use crate::error::kinds;
 use crate::figure::{Drawings, FigureInputs};
 use crate::inputs::Source;
 use crate::losses::{Counted, LostAs, lost_episodes};
@@ -16,7 +15,7 @@ use crate::results::{Outputs, Results};
 use crate::statistics::{design_audit, statistics};
 use crate::study::Grouped;
 use crate::tables::tables;
-use crate::{Study, StudyError, scores};
+use crate::{ErrorKind, Study, StudyError, scores};
 use mirrorstats_analysis::plan::departures::Looks;
 use mirrorstats_analysis::statistics::{DesignAudit, Options, Statistics};
 use mirrorstats_exact::replace;
@@ -36,17 +35,6 @@ use mirrorstats_trace::footers::{answered, renderer};
 use mirrorstats_trace::schema::SCHEMA_VERSION;
 
 pub(crate) const MOST_LISTED: usize = 20_000;
-
-#[derive(Debug, thiserror::Error)]
-#[error("no table of the style `{style}` is named `{name}`; it has {known}{hint}")]
-pub(crate) struct UnknownTable {
-    name: String,
-    style: String,
-    known: String,
-    hint: String,
-}
-
-kinds! { Argument: UnknownTable; }
 
 /// The options of a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -246,8 +234,9 @@ impl Report {
         let found = self.tables.iter().find(|table| table.name == name);
         found.ok_or_else(|| {
             let known = || self.tables.iter().map(|table| table.name.as_str());
-            let (known, hint) = (known().collect::<Vec<_>>().join(", "), hint(name, known()));
-            UnknownTable { name: name.to_owned(), style: self.style.name.clone(), known, hint }.into()
+            let (style, hint, known) = (&self.style.name, hint(name, known()), known().collect::<Vec<_>>().join(", "));
+            let words = format!("no table of the style `{style}` is named `{name}`; it has {known}{hint}");
+            StudyError::new(ErrorKind::Argument, words)
         })
     }
 

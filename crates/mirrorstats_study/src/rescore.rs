@@ -18,32 +18,6 @@ use mirrorstats_score::format::{self, Partition};
 use mirrorstats_score::tables::table::EpisodeTable;
 use mirrorstats_trace::inputs::Input;
 
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum RescoreError {
-    #[error(
-        "{out}: expected a folder beside the report, found the report itself\n  \
-         help: the old report stays as it is; give another --out"
-    )]
-    OntoItself { out: String },
-    #[error(
-        "the style `{name}` changed since the report was made: expected sha256 {expected}, found {found}\n  \
-         help: name the style with --style"
-    )]
-    StyleChanged { name: String, expected: String, found: String },
-    #[error(
-        "the report's style `{name}` (sha256 {expected}) was a file, and a manifest keeps no paths\n  \
-         help: name the style with --style"
-    )]
-    StyleGone { name: String, expected: String },
-}
-
-impl From<RescoreError> for StudyError {
-    fn from(error: RescoreError) -> Self {
-        let is_output = matches!(error, RescoreError::OntoItself { .. });
-        Self::new(if is_output { ErrorKind::Output } else { ErrorKind::Input }, error)
-    }
-}
-
 /// The report to remake, and the changes.
 #[derive(Clone, Debug)]
 pub struct RescoreRequest {
@@ -109,16 +83,23 @@ impl RescoreRequest {
     }
 
     /// The name or path of the style: the report's own unless another is requested.
-    fn style(&self, manifest: &Manifest) -> Result<PathBuf, RescoreError> {
+    fn style(&self, manifest: &Manifest) -> Result<PathBuf, StudyError> {
         if let Some(style) = &self.style {
             return Ok(style.clone());
         }
-        let (name, expected) = (manifest.style.name.clone(), manifest.style.sha256.clone());
-        match Style::load(&name) {
-            Ok(style) if style.hash == expected => Ok(name.into()),
-            Ok(style) => Err(RescoreError::StyleChanged { name, expected, found: style.hash }),
-            Err(_) => Err(RescoreError::StyleGone { name, expected }),
-        }
+        let (name, expected) = (&manifest.style.name, &manifest.style.sha256);
+        let found = match Style::load(name) {
+            Ok(style) if style.hash == *expected => return Ok(name.into()),
+            Ok(Style { hash, .. }) => {
+                format!(
+                    "the style `{name}` changed since the report was made: expected sha256 {expected}, found {hash}"
+                )
+            }
+            Err(_) => {
+                format!("the report's style `{name}` (sha256 {expected}) was a file, and a manifest keeps no paths")
+            }
+        };
+        Err(StudyError::new(ErrorKind::Input, format!("{found}\n  help: name the style with --style")))
     }
 
     fn scores_before(&self, manifest: &Manifest) -> Result<EpisodeTable, String> {
@@ -141,7 +122,12 @@ pub fn folder_of_rescored(report: &Path, out: Option<&Path>) -> Result<PathBuf, 
         None => beside(report)?,
     };
     if place(&out)? == place(report)? {
-        return Err(RescoreError::OntoItself { out: out.display().to_string() }.into());
+        let words = format!(
+            "{}: expected a folder beside the report, found the report itself\n  \
+             help: the old report stays as it is; give another --out",
+            out.display()
+        );
+        return Err(StudyError::new(ErrorKind::Output, words));
     }
     Ok(out)
 }

@@ -16,10 +16,8 @@ use mirrorstats_score::timeline::Timeline;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "each output is asked for by itself")]
 pub struct Outputs {
-    /// Times of looks, claims and decisions, for the figure `gaze`.
+    /// Times of looks, claims and decisions, for the figure `gaze`, and the endings of open questions, for `e5-outcomes`.
     pub timelines: bool,
-    /// Endings of open questions, for the figure `e5-outcomes`.
-    pub outcomes: bool,
     pub quality: bool,
     /// The hashes of the inputs.
     pub hashes: bool,
@@ -32,9 +30,8 @@ pub struct Outputs {
 impl Outputs {
     /// The inputs of these figures.
     pub fn of_figures(names: &[FigureName]) -> Self {
-        let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
-        let design = names.contains(&FigureName::Forest);
-        Self { timelines, outcomes, design, ..Self::default() }
+        let timelines = names.contains(&FigureName::Gaze) || names.contains(&FigureName::E5Outcomes);
+        Self { timelines, design: names.contains(&FigureName::Forest), ..Self::default() }
     }
 }
 
@@ -46,7 +43,7 @@ pub struct Results {
     /// One timeline per episode, in table order. `None` if not requested, for scores, for definitions that do not name
     /// the moments, and for more episodes than `gaze` draws.
     pub timelines: Option<Vec<Timeline>>,
-    /// The endings of open questions. `None` if not requested, and if there is no such question.
+    /// The endings of open questions. `None` without timelines, and if there is no such question.
     pub outcomes: Option<Outcomes>,
     /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` if the inputs do
     /// not record it.
@@ -83,14 +80,14 @@ impl Results {
         Cow::Owned(Self { episodes, timelines, ..self.clone() })
     }
 
-    pub(crate) fn select(&mut self, outputs: Outputs) {
-        if outputs.outcomes && Outcomes::are_there(&self.episodes) {
+    /// Finds the endings of open questions; drops timelines that are too many to draw.
+    pub(crate) fn find_outcomes(&mut self) {
+        if self.timelines.is_some() && Outcomes::are_there(&self.episodes) {
             let shown = self.with_conditions_as_models();
-            let answered =
-                shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
-            self.outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::from_table(&shown.episodes, &answered));
+            let answered: Vec<bool> = shown.timelines.iter().flatten().map(|line| line.answered).collect();
+            self.outcomes = Outcomes::from_table(&shown.episodes, &answered);
         }
-        if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
+        if self.episodes.len() > gaze::MOST_EPISODES {
             self.timelines = None;
         }
     }
@@ -105,10 +102,8 @@ impl Results {
         let kept: BTreeSet<&str> = means.iter().take(most).map(|mean| mean.model).collect();
         let is_kept = |row: &usize| kept.contains(episodes.keys.get(*row).model);
         let rows: Vec<usize> = (0..episodes.len()).filter(is_kept).collect();
-        let outcomes = self.outcomes.clone().map(|Outcomes { experiment, mut rows }| {
-            rows.retain(|row| kept.contains(row.model.as_str()));
-            Outcomes { experiment, rows }
-        });
+        let mut outcomes = self.outcomes.clone();
+        outcomes.iter_mut().for_each(|found| found.rows.retain(|model, _| kept.contains(model.as_str())));
         Self { outcomes, ..self.taken(&rows) }
     }
 

@@ -35,7 +35,7 @@ pub(crate) fn scan(
     let reader = if outputs.quality { QualityReader::of(traces) } else { QualityReader::of_statuses(traces) };
     let wanted = score_traces::Outputs {
         labels: &labels,
-        timelines: outputs.timelines || outputs.outcomes,
+        timelines: outputs.timelines,
         quality: (outputs.quality || !reader.columns().is_empty()).then_some(&reader),
         unchecked: &UNCHECKED,
         copy_candidates: outputs.copy_candidates,

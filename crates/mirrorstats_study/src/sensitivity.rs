@@ -41,40 +41,6 @@ pub const DEFAULT_THRESHOLDS: &str = "1,10,30,60,120,240";
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Thresholds(Vec<u32>);
 
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum SensitivityError {
-    #[error(
-        "expected traces of the domain `mirror`, whose thresholds of evidence vary here; found another domain\n  \
-         help: write the other threshold into a definition file, and compare it with `mirrorstats diff`"
-    )]
-    NoMirror,
-    #[error(
-        "expected traces with the column `{PIXELS}`, to which a threshold applies: {problem}\n  \
-         help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns"
-    )]
-    NoPixels { problem: String },
-    #[error(
-        "{PIXELS}: expected a value at every step, found {steps} without one, for example in `{episode}`: a threshold does \
-         not say what they show\n  \
-         help: --where \"all({PIXELS} is not null)\" keeps the episodes that have them"
-    )]
-    PixelsMissing { steps: String, episode: String },
-    #[error(
-        "expected a metric that depends on the `let` `{EVIDENCE}`, found none among {metrics}\n  \
-         help: ask for other metrics with --metrics, or let the definitions use `{EVIDENCE}`"
-    )]
-    NothingMoves { metrics: String },
-    #[error("{definitions}: {source}")]
-    Evidence { definitions: String, source: ReplaceError },
-}
-
-impl From<SensitivityError> for StudyError {
-    fn from(error: SensitivityError) -> Self {
-        let is_argument = matches!(error, SensitivityError::NothingMoves { .. });
-        Self::new(if is_argument { ErrorKind::Argument } else { ErrorKind::Input }, error)
-    }
-}
-
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "expected whole numbers of pixels from 1 on, separated by commas, such as {DEFAULT_THRESHOLDS}, found `{found}`"
@@ -182,7 +148,12 @@ impl Trial {
         let metrics = as_is.plan.outputs.iter().map(|output| output.name.clone());
         let (moved, unmoved): (Vec<String>, Vec<String>) = metrics.partition(|name| dependent.contains(name));
         if moved.is_empty() {
-            return Err(SensitivityError::NothingMoves { metrics: unmoved.join(", ") }.into());
+            let metrics = unmoved.join(", ");
+            let words = format!(
+                "expected a metric that depends on the `let` `{EVIDENCE}`, found none among {metrics}\n  \
+                 help: ask for other metrics with --metrics, or let the definitions use `{EVIDENCE}`"
+            );
+            return Err(StudyError::new(ErrorKind::Argument, words));
         }
         let mut definitions = vec![as_is];
         for px in &thresholds.0 {
@@ -219,10 +190,7 @@ fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions,
     let replaced = as_is.with_condition_let(EVIDENCE, &shown, &format!("{PIXELS} >= {px}"), columns);
     let definitions = replaced.map_err(|source| match source {
         ReplaceError::Faults(faults) => StudyError::from(faults),
-        source => {
-            let definitions = question.definitions_name().display().to_string();
-            SensitivityError::Evidence { definitions, source }.into()
-        }
+        other => refused(&format!("{}: {other}", question.definitions_name().display())),
     })?;
     question.applied(definitions, columns)
 }
@@ -241,9 +209,16 @@ fn recorded_px(traces: &TraceSet) -> Vec<u64> {
     px.into_iter().collect()
 }
 
-fn check_pixels(traces: &TraceSet) -> Result<(), SensitivityError> {
+fn refused(words: &str) -> StudyError {
+    StudyError::new(ErrorKind::Input, words)
+}
+
+fn check_pixels(traces: &TraceSet) -> Result<(), StudyError> {
     if traces.domain() == Domain::Own {
-        return Err(SensitivityError::NoMirror);
+        return Err(refused(
+            "expected traces of the domain `mirror`, whose thresholds of evidence vary here; found another domain\n  \
+             help: write the other threshold into a definition file, and compare it with `mirrorstats diff`",
+        ));
     }
     let problem = match traces.column(PIXELS) {
         None => "no trace has it".to_owned(),
@@ -255,14 +230,15 @@ fn check_pixels(traces: &TraceSet) -> Result<(), SensitivityError> {
             (None, None) => return Ok(()),
         },
     };
-    Err(SensitivityError::NoPixels { problem })
+    let help =
+        "give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns";
+    Err(refused(&format!(
+        "expected traces with the column `{PIXELS}`, to which a threshold applies: {problem}\n  help: {help}"
+    )))
 }
 
 /// Checks that every step of the counted episodes has a value; `pixels` counts the steps without one.
-fn check_values<'t>(
-    pixels: &EpisodeTable,
-    counted: impl Iterator<Item = &'t EpisodeTable>,
-) -> Result<(), SensitivityError> {
+fn check_values<'t>(pixels: &EpisodeTable, counted: impl Iterator<Item = &'t EpisodeTable>) -> Result<(), StudyError> {
     let ids: BTreeSet<&str> = counted.flat_map(|table| table.keys.iter().map(|key| key.episode_id)).collect();
     let missing = pixels.metrics.iter().flat_map(|metric| pixels.keys.iter().zip(metric.iter()));
     let missing: Vec<(&str, i64)> = missing
@@ -271,8 +247,12 @@ fn check_values<'t>(
         .collect();
     let Some((episode, _)) = missing.first() else { return Ok(()) };
     let steps: i64 = missing.iter().map(|(_, count)| count).sum();
-    let steps = format!("{steps} in {} of {} episodes", missing.len(), ids.len());
-    Err(SensitivityError::PixelsMissing { steps, episode: (*episode).to_owned() })
+    let (without, all) = (missing.len(), ids.len());
+    Err(refused(&format!(
+        "{PIXELS}: expected a value at every step, found {steps} in {without} of {all} episodes without one, for example in \
+         `{episode}`: a threshold does not say what they show\n  \
+         help: --where \"all({PIXELS} is not null)\" keeps the episodes that have them"
+    )))
 }
 
 #[cfg(test)]

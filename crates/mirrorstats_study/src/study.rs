@@ -7,7 +7,6 @@ use std::thread;
 
 use crate::StudyError;
 use crate::caveats::undecided;
-use crate::empty_filter::{self, EmptyFilter};
 use crate::import::Logs;
 use crate::inputs::{self, InputError, Source, Stamp, resolve};
 use crate::limits::check_comparisons;
@@ -15,7 +14,7 @@ use crate::losses::{self, Counted};
 use crate::own_definitions::chosen;
 use crate::question::Question;
 use crate::results::{Outputs, Results};
-use crate::{design, pooled, scan, scores};
+use crate::{ErrorKind, design, empty_filter, pooled, scan, scores};
 use mirrorstats_analysis::plan::register::RegisteredPlan;
 use mirrorstats_exact::replace;
 use mirrorstats_metric::file;
@@ -83,8 +82,7 @@ impl Study {
     /// Sets the definitions: `paper`, `extended`, or the path of a TOML file. Errors: a file that cannot be read; every
     /// fault in it.
     pub fn definitions(self, name: impl Into<PathBuf>) -> Result<Self, StudyError> {
-        let definitions = Some(name.into());
-        let question = Question { definitions, ..self.question.clone() };
+        let question = Question { definitions: Some(name.into()), ..self.question.clone() };
         self.asked(question)
     }
 
@@ -181,7 +179,7 @@ impl Study {
         // A changed file explains any other error.
         self.check_unchanged()?;
         let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
-        results.select(outputs);
+        results.find_outcomes();
         self.declare(&mut results)?;
         results.quality = results.quality.filter(|_| outputs.quality);
         Ok(results)
@@ -242,7 +240,10 @@ impl Study {
     }
 
     pub(crate) fn check_filter(&self, episodes: usize) -> Result<(), StudyError> {
-        self.empty_filter(episodes)?.map_or(Ok(()), |words| Err(EmptyFilter { words }.into()))
+        self.empty_filter(episodes)?.map_or(Ok(()), |words| {
+            let help = "help: give a filter that holds for some of them, or none";
+            Err(StudyError::new(ErrorKind::Argument, format!("{words}\n  {help}")))
+        })
     }
 
     /// A sentence about traces whose checksums belong to another version of the file.

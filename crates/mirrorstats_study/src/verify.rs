@@ -5,7 +5,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::fs::{self, Metadata};
-use std::path::Path;
+use std::io;
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -68,20 +69,14 @@ pub enum Kind {
 
 pub fn verify(folder: &Path) -> Result<Verification, ProvenanceError> {
     let listed = listed(folder)?;
-    let mut there = BTreeMap::new();
-    find(folder, "", &mut there)?;
+    let mut there = entries(folder).map_err(|(path, source)| ProvenanceError::Unreadable { path, source })?;
     let mut differences = Vec::new();
     for (path, output) in &listed {
         differences.extend(difference(folder, path, output, there.remove(path))?);
     }
     there.remove(MANIFEST);
-    differences.extend(there.into_iter().map(|(path, found)| Difference {
-        path,
-        kind: Kind::Unexpected,
-        cell: None,
-        expected: "no such file".to_owned(),
-        found: kind_of(&found).to_owned(),
-    }));
+    let unexpected = |(path, about)| Difference::new(path, Kind::Unexpected, "no such file", kind_of(&about));
+    differences.extend(there.into_iter().map(unexpected));
     differences.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(Verification { files: listed.len(), differences, ..Verification::default() })
 }
@@ -116,23 +111,25 @@ fn fault(output: &Output) -> Option<String> {
     (!is_hash).then(|| format!("the output `{shown}` with `{}` in place of a SHA-256", visible(&output.sha256)))
 }
 
-/// Collects everything in a folder except folders, by relative path.
-fn find(folder: &Path, inside: &str, there: &mut BTreeMap<String, Metadata>) -> Result<(), ProvenanceError> {
+/// Everything in a folder except folders, by its path inside, `/` between the parts. Follows no links. The error names
+/// what cannot be read.
+pub fn entries(folder: &Path) -> Result<BTreeMap<String, Metadata>, (PathBuf, io::Error)> {
+    let mut found = BTreeMap::new();
     let unreadable = |path: &Path| {
         let path = path.to_owned();
-        move |source| ProvenanceError::Unreadable { path, source }
+        move |error| (path, error)
     };
     for entry in fs::read_dir(folder).map_err(unreadable(folder))? {
         let entry = entry.map_err(unreadable(folder))?;
-        let path = format!("{inside}{}", entry.file_name().to_string_lossy());
+        let name = entry.file_name().to_string_lossy().into_owned();
         let about = fs::symlink_metadata(entry.path()).map_err(unreadable(&entry.path()))?;
         if about.is_dir() {
-            find(&entry.path(), &format!("{path}/"), there)?;
+            found.extend(entries(&entry.path())?.into_iter().map(|(path, about)| (format!("{name}/{path}"), about)));
         } else {
-            there.insert(path, about);
+            found.insert(name, about);
         }
     }
-    Ok(())
+    Ok(found)
 }
 
 fn difference(
@@ -142,12 +139,10 @@ fn difference(
     there: Option<Metadata>,
 ) -> Result<Option<Difference>, ProvenanceError> {
     let expected = format!("{} bytes with the SHA-256 {}", output.bytes, output.sha256);
-    let differs = |kind, found: String| {
-        Ok(Some(Difference { path: path.to_owned(), kind, cell: None, expected: expected.clone(), found }))
-    };
-    let Some(about) = there else { return differs(Kind::Missing, "no such file".to_owned()) };
+    let differs = |kind, found: &str| Ok(Some(Difference::new(path, kind, expected.as_str(), found)));
+    let Some(about) = there else { return differs(Kind::Missing, "no such file") };
     if !about.is_file() {
-        return differs(Kind::Changed, kind_of(&about).to_owned());
+        return differs(Kind::Changed, kind_of(&about));
     }
     let at = folder.join(path);
     let found = input::open(&at)
@@ -156,7 +151,14 @@ fn difference(
     if found == output.sha256.to_ascii_lowercase() && about.len() == output.bytes {
         return Ok(None);
     }
-    differs(Kind::Changed, format!("{} bytes with the SHA-256 {found}", about.len()))
+    differs(Kind::Changed, &format!("{} bytes with the SHA-256 {found}", about.len()))
+}
+
+impl Difference {
+    /// The difference of a whole file.
+    pub fn new(path: impl Into<String>, kind: Kind, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self { path: path.into(), kind, cell: None, expected: expected.into(), found: found.into() }
+    }
 }
 
 impl Verification {

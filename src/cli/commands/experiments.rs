@@ -13,15 +13,8 @@ use mirrorstats_experiment::file::Loaded;
 use mirrorstats_experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
 
 /// Check, explain and show experiments
-#[derive(Clone, Debug, clap::Args)]
-pub struct ExperimentsArgs {
-    #[command(subcommand)]
-    pub action: ExperimentsAction,
-}
-
-/// The action on experiments.
 #[derive(Clone, Debug, clap::Subcommand)]
-pub enum ExperimentsAction {
+pub enum ExperimentsCommand {
     /// Show every fault of a file of experiments, underlined, with a suggestion
     Check {
         /// A TOML file
@@ -58,12 +51,12 @@ pub struct ExperimentsAnswer {
     pub experiments: Vec<Spec>,
 }
 
-impl ExperimentsArgs {
+impl ExperimentsCommand {
     pub fn run(self) -> Result<Outcome, Failure> {
-        match self.action {
-            ExperimentsAction::Check { file, json } => check(&file, json),
-            ExperimentsAction::Explain { experiment, prompt, json } => explain(&experiment, prompt, json),
-            ExperimentsAction::Show { name } => show(name.as_deref()),
+        match self {
+            Self::Check { file, json } => check(&file, json),
+            Self::Explain { experiment, prompt, json } => explain(&experiment, prompt, json),
+            Self::Show { name } => show(name.as_deref()),
         }
     }
 }

@@ -43,13 +43,18 @@ pub enum Command {
     Trace(trace::TraceCommand),
     #[command(subcommand)]
     Table(table::TableCommand),
-    Definitions(definitions::DefinitionsArgs),
-    Experiments(experiments::ExperimentsArgs),
-    Style(style::StyleArgs),
+    #[command(subcommand)]
+    Definitions(definitions::DefinitionsCommand),
+    #[command(subcommand)]
+    Experiments(experiments::ExperimentsCommand),
+    #[command(subcommand)]
+    Style(style::StyleCommand),
     #[cfg(feature = "sim")]
-    World(world::WorldArgs),
+    #[command(subcommand)]
+    World(world::WorldCommand),
     #[cfg(all(feature = "sim", feature = "view"))]
-    Participants(participants::ParticipantsArgs),
+    #[command(subcommand)]
+    Participants(participants::ParticipantsCommand),
     #[command(subcommand)]
     Setup(setup::SetupCommand),
 }
@@ -80,13 +85,13 @@ impl Command {
             Self::Plan(args) => args.run(),
             Self::Trace(command) => command.run(),
             Self::Table(command) => command.run(),
-            Self::Definitions(args) => args.run(),
-            Self::Experiments(args) => args.run(),
-            Self::Style(args) => args.run(),
+            Self::Definitions(command) => command.run(),
+            Self::Experiments(command) => command.run(),
+            Self::Style(command) => command.run(),
             #[cfg(feature = "sim")]
-            Self::World(args) => args.run(),
+            Self::World(command) => command.run(),
             #[cfg(all(feature = "sim", feature = "view"))]
-            Self::Participants(args) => args.run(),
+            Self::Participants(command) => command.run(),
             Self::Setup(command) => command.run(),
         }
     }

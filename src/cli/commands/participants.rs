@@ -9,14 +9,8 @@ use mirrorstats_exact::format::counted;
 use mirrorstats_record::participants::{self, Removed};
 
 /// Remove people from a recording
-#[derive(Clone, Debug, clap::Args)]
-pub struct ParticipantsArgs {
-    #[command(subcommand)]
-    command: ParticipantsCommand,
-}
-
 #[derive(Clone, Debug, clap::Subcommand)]
-enum ParticipantsCommand {
+pub enum ParticipantsCommand {
     /// Remove a person: out of the traces, the logs and the journal of a folder
     ///
     /// Reports that were made before keep their numbers: make them again.
@@ -33,9 +27,9 @@ enum ParticipantsCommand {
     },
 }
 
-impl ParticipantsArgs {
+impl ParticipantsCommand {
     pub fn run(self) -> Result<Outcome, Failure> {
-        let ParticipantsCommand::Remove { code, folder, json } = self.command;
+        let Self::Remove { code, folder, json } = self;
         let removed = participants::remove(&folder, &code).map_err(Failure::Input)?;
         if removed == Removed::default() {
             let (code, folder) = (visible(&code), folder.display());

@@ -10,15 +10,8 @@ use mirrorstats_report::style::{Style, built_in, built_in_names};
 use mirrorstats_score::vocabulary::schema_columns;
 
 /// Show and check styles: how tables look
-#[derive(Clone, Debug, clap::Args)]
-pub struct StyleArgs {
-    #[command(subcommand)]
-    action: StyleAction,
-}
-
-/// The action on styles.
 #[derive(Clone, Debug, clap::Subcommand)]
-enum StyleAction {
+pub enum StyleCommand {
     /// Print a built-in style, to start your own from
     Show {
         /// `default` or `paper`
@@ -36,11 +29,11 @@ enum StyleAction {
     },
 }
 
-impl StyleArgs {
+impl StyleCommand {
     pub fn run(self) -> Result<Outcome, Failure> {
-        match self.action {
-            StyleAction::Show { name } => show(&name),
-            StyleAction::Check { file, definitions } => check(&file, &definitions),
+        match self {
+            Self::Show { name } => show(&name),
+            Self::Check { file, definitions } => check(&file, &definitions),
         }
     }
 }

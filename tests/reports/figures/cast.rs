@@ -8,7 +8,7 @@ use mirrorstats_exact::chance::Chance;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_figures::Input;
-use mirrorstats_figures::e5_outcomes::{OutcomeRow, Outcomes};
+use mirrorstats_figures::e5_outcomes::Outcomes;
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog, Experiment, Factor, Kind, Metric, StandardError};
 use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_score::tables::table::{Declared, EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
@@ -263,8 +263,7 @@ fn outcomes(cells: &Cells) -> Outcomes {
     let rows = cells.groups.iter().filter(|group| group.key[0].to_string() == "E5").map(|group| {
         let correct = u64::try_from(group.moments[0].sum).unwrap();
         let wrong = (group.episodes - correct) / 3;
-        let model = group.key[1].to_string();
-        OutcomeRow { model, correct, wrong, uncommitted: group.episodes - correct - wrong }
+        (group.key[1].to_string(), [correct, wrong, group.episodes - correct - wrong])
     });
     Outcomes { experiment: "E5".to_owned(), rows: rows.collect() }
 }

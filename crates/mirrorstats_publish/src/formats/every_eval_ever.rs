@@ -127,22 +127,20 @@ fn lines(
 ) -> String {
     let mut lines = String::new();
     for (key, row) in episodes.keys.iter().zip(0..).filter(|(key, _)| key.model == model) {
-        let Some(Transcript { head, said }) = transcripts.get(key.episode_id) else { continue };
-        let ask = format!("{}: the observation of each step, until the agent decides", key.experiment);
-        let turn = |at: usize, role: &str, content: &str| json!({ "turn_idx": at, "role": role, "content": content });
-        let answers = said.iter().zip(1..).map(|(text, at)| turn(at, "assistant", text));
-        let messages: Vec<Value> = std::iter::once(turn(0, "user", &ask)).chain(answers).collect();
+        let Some(transcript) = transcripts.get(key.episode_id) else { continue };
+        let turn = |at, role: &str, content: &str| json!({ "turn_idx": at, "role": role, "content": content });
+        let messages = transcript.messages(key.experiment, turn);
         for column in &episodes.metrics {
             let Some(value) = column.get(row).filter(|_| episodes.catalog.metric[&column.name].kind == Kind::Rate)
             else {
                 continue;
             };
             let name = format!("{}: {}", key.experiment, column.name);
-            let scene = head.scene.clone().unwrap_or_else(|| format!("seed {}, run {}", key.seed, key.run));
+            let scene = transcript.head.scene.clone().unwrap_or_else(|| format!("seed {}, run {}", key.seed, key.run));
             let line = json!({
                 "schema_version": VERSION, "evaluation_id": evaluation_id, "model_id": id, "evaluation_name": name,
                 "evaluation_result_id": name, "sample_id": key.episode_id, "interaction_type": "agentic",
-                "input": { "raw": ask, "reference": [] }, "messages": messages, "answer_attribution": [],
+                "input": { "raw": messages[0]["content"], "reference": [] }, "messages": messages, "answer_attribution": [],
                 "evaluation": { "score": value, "is_correct": value == 1, "num_turns": messages.len() },
                 "metadata": { "scene": scene },
             });

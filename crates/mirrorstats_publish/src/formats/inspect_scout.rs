@@ -61,7 +61,7 @@ pub(super) fn write_all(study: &Study, out: &Path) -> Result<Vec<String>, Publis
         ("score", text(&|row| Some(rows[row].1.clone()))),
         ("success", Arc::new(rows.iter().map(|row| row.2).collect::<BooleanArray>())),
         ("message_count", number(&|row| i64::try_from(rows[row].3.said.len() + 1).unwrap_or(i64::MAX))),
-        ("messages", text(&|row| Some(messages(&rows[row].0.experiment, rows[row].3)))),
+        ("messages", text(&|row| Some(messages(&rows[row].0.experiment, rows[row].3).to_string()))),
         ("seed", number(&|row| rows[row].0.seed.into())),
         ("run", number(&|row| rows[row].0.run.into())),
         ("condition", text(&|row| head(row).condition.clone())),
@@ -80,11 +80,8 @@ pub(super) fn write_all(study: &Study, out: &Path) -> Result<Vec<String>, Publis
     Ok(LEFT_OUT.map(str::to_owned).to_vec())
 }
 
-/// The messages of a transcript: what was asked, then what the agent said or did in each step.
-fn messages(experiment: &str, transcript: &Transcript) -> String {
-    let ask = format!("{experiment}: the observation of each step, until the agent decides");
-    let message =
-        |at: usize, role: &str, content: &str| json!({ "id": at.to_string(), "role": role, "content": content });
-    let answers = transcript.said.iter().zip(1..).map(|(text, at)| message(at, "assistant", text));
-    Value::from(std::iter::once(message(0, "user", &ask)).chain(answers).collect::<Vec<_>>()).to_string()
+fn messages(experiment: &str, transcript: &Transcript) -> Value {
+    transcript
+        .messages(experiment, |at, role, content| json!({ "id": at.to_string(), "role": role, "content": content }))
+        .into()
 }

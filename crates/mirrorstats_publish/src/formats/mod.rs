@@ -4,7 +4,6 @@ mod every_eval_ever;
 mod inspect_scout;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::Path;
 
 use mirrorstats_exact::replace::{TemporaryFolder, folder_of, make_folder};
@@ -17,7 +16,7 @@ use serde_json::{Map, Value};
 
 use crate::about::About;
 use crate::manifest::list;
-use crate::{Progress, PublishError, put};
+use crate::{Progress, PublishError, is_empty, put};
 
 /// A format of another program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +38,7 @@ pub fn export(
     out: &Path,
     progress: Progress<'_>,
 ) -> Result<(Vec<String>, Vec<String>), PublishError> {
-    if fs::read_dir(out).map_or(out.exists(), |mut entries| entries.next().is_some()) {
+    if !is_empty(out) {
         let name = out.display();
         return Err(PublishError::Refused(format!(
             "--out: expected a new folder, found `{name}`\n  help: name another folder"
@@ -64,6 +63,16 @@ pub(crate) struct Transcript {
     pub head: Episode,
     /// What the agent said or did in each step.
     pub said: Vec<String>,
+}
+
+impl Transcript {
+    /// The messages: the request, then what the agent said or did in each step. `message` takes the position, the role
+    /// and the text.
+    fn messages(&self, experiment: &str, message: impl Fn(usize, &str, &str) -> Value) -> Vec<Value> {
+        let ask = format!("{experiment}: the observation of each step, until the agent decides");
+        let answers = self.said.iter().zip(1..).map(|(text, at)| message(at, "assistant", text));
+        std::iter::once(message(0, "user", &ask)).chain(answers).collect()
+    }
 }
 
 /// The episodes of a study that count, by id.

@@ -20,15 +20,8 @@ use mirrorstats_trace::inputs;
 use mirrorstats_trace::read::open::TraceSet;
 
 /// Check, explain and show metrics, their SQL, their sensitivity
-#[derive(Clone, Debug, clap::Args)]
-pub struct DefinitionsArgs {
-    #[command(subcommand)]
-    pub action: Action,
-}
-
-/// The action on definitions.
 #[derive(Clone, Debug, clap::Subcommand)]
-pub enum Action {
+pub enum DefinitionsCommand {
     /// Show every fault of a definition file, underlined, with a suggestion
     Check {
         /// `paper`, `extended`, or a TOML file
@@ -76,14 +69,14 @@ pub struct CheckAnswer {
     pub faults: Vec<FaultRecord>,
 }
 
-impl DefinitionsArgs {
+impl DefinitionsCommand {
     pub fn run(self) -> Result<Outcome, Failure> {
-        match self.action {
-            Action::Check { file, traces, json } => check(&file, &traces, json),
-            Action::Explain { metric, definitions, json } => explain(&metric, &definitions, json),
-            Action::Show { name } => show(&name),
-            Action::Sql(args) => args.run(),
-            Action::Sensitivity(args) => args.run(),
+        match self {
+            Self::Check { file, traces, json } => check(&file, &traces, json),
+            Self::Explain { metric, definitions, json } => explain(&metric, &definitions, json),
+            Self::Show { name } => show(&name),
+            Self::Sql(args) => args.run(),
+            Self::Sensitivity(args) => args.run(),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use crate::cli::args::{GroupingArgs, ScoringArgs};
+use crate::cli::args::{Described, GroupingArgs, ScoringArgs, described};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_metric::sql::{self, Dialect};
 use mirrorstats_score::vocabulary::{schema_columns, trace_columns};
@@ -17,29 +17,15 @@ pub struct SqlArgs {
     #[command(flatten)]
     pub scoring: ScoringArgs,
     /// The SQL dialect
-    #[arg(long, value_enum, default_value_t = DialectArg::Portable)]
-    pub dialect: DialectArg,
+    #[arg(long, value_parser = described(&DIALECTS), default_value = DIALECTS[0].1)]
+    pub dialect: Dialect,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum DialectArg {
-    /// The common subset of all engines
-    Portable,
-    /// Spark SQL
-    Spark,
-    /// `DuckDB`
-    Duckdb,
-}
-
-impl From<DialectArg> for Dialect {
-    fn from(dialect: DialectArg) -> Self {
-        match dialect {
-            DialectArg::Portable => Self::Portable,
-            DialectArg::Spark => Self::Spark,
-            DialectArg::Duckdb => Self::Duckdb,
-        }
-    }
-}
+const DIALECTS: [Described<Dialect>; 3] = [
+    (Dialect::Portable, "portable", "The common subset of all engines"),
+    (Dialect::Spark, "spark", "Spark SQL"),
+    (Dialect::Duckdb, "duckdb", "`DuckDB`"),
+];
 
 impl SqlArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
@@ -50,7 +36,7 @@ impl SqlArgs {
             let study = Study::open(self.traces.clone())?;
             question.resolved(study.traces()?)?.bind_to(&trace_columns(study.traces()?))?
         };
-        let statement = sql::lower(&definitions.plan, self.dialect.into())?;
+        let statement = sql::lower(&definitions.plan, self.dialect)?;
         output::plain(statement)
     }
 }

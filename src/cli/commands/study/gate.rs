@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs, TraceArgs, number};
+use crate::cli::args::{Described, GroupingArgs, ScoringArgs, ThreadArgs, TraceArgs, described, number};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_analysis::gate::{GateFormat, GateOptions, GateVerdict};
 use mirrorstats_study::gate::{gate, leading_metric};
@@ -42,26 +42,22 @@ pub struct GateArgs {
     #[arg(long)]
     pub pool: bool,
     /// Output format
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = described(&FORMATS), default_value = FORMATS[0].1)]
     pub format: Format,
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
-    /// A table, then the flipped episodes
-    #[default]
-    Text,
-    /// Markdown
-    Md,
-    /// Workflow commands of GitHub Actions
-    Github,
-    /// `JUnit` XML
-    Junit,
-    /// JSON: schemas/gate.schema.json
-    Json,
-}
+/// The form of the answer; JSON if `None`.
+type Format = Option<GateFormat>;
+
+const FORMATS: [Described<Format>; 5] = [
+    (Some(GateFormat::Text(None)), "text", "A table, then the flipped episodes"),
+    (Some(GateFormat::Markdown), "md", "Markdown"),
+    (Some(GateFormat::Github), "github", "Workflow commands of GitHub Actions"),
+    (Some(GateFormat::Junit), "junit", "`JUnit` XML"),
+    (None, "json", "JSON: schemas/gate.schema.json"),
+];
 
 impl GateArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
@@ -78,16 +74,10 @@ impl GateArgs {
         };
         let Self { margin, confidence, pool, .. } = self;
         let gate = gate(&base, &new, &GateOptions { metric, margin, confidence, pool })?;
-        let format = match self.format {
-            Format::Text => Some(GateFormat::Text(terminal::width())),
-            Format::Md => Some(GateFormat::Markdown),
-            Format::Github => Some(GateFormat::Github),
-            Format::Junit => Some(GateFormat::Junit),
-            Format::Json => None,
-        };
-        match format {
-            Some(format) => output::plain(gate.render(format))?,
+        match self.format {
             None => output::print_json(&gate)?,
+            Some(GateFormat::Text(_)) => output::plain(gate.render(GateFormat::Text(terminal::width())))?,
+            Some(format) => output::plain(gate.render(format))?,
         };
         Ok(match gate.verdict {
             GateVerdict::Improved | GateVerdict::Held => Outcome::Done,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::args::{Described, GroupingArgs, ScoringArgs, TraceArgs, described};
 use crate::cli::{Failure, Outcome, output};
 use mirrorstats_exact::format::counted;
 use mirrorstats_publish::about::About;
@@ -31,11 +31,11 @@ pub struct PublishArgs {
     #[arg(short, long, value_name = "DIR")]
     pub out: PathBuf,
     /// The form of the folder
-    #[arg(long, value_enum, default_value_t)]
-    pub format: FormatArg,
+    #[arg(long, value_parser = described(&FORMATS), default_value = FORMATS[0].1)]
+    pub format: FolderFormat,
     /// The frames of the logs beside the traces
-    #[arg(long, value_enum, default_value_t)]
-    pub frames: FramesArg,
+    #[arg(long, value_parser = described(&FRAMES), default_value = FRAMES[2].1)]
+    pub frames: Frames,
     /// A description of the data set: title, authors, licence, limitations
     #[arg(long, value_name = "FILE")]
     pub about: Option<PathBuf>,
@@ -54,27 +54,24 @@ pub struct PublishArgs {
     pub json: bool,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum FormatArg {
-    /// Everything, as described above
-    #[default]
-    Bundle,
-    /// Results with intervals and a line per episode and rate, for Every Eval Ever 0.3
-    EveryEvalEver,
-    /// A row per episode with its messages, for Inspect Scout
-    InspectScout,
-}
+/// The format of another program; a bundle if `None`.
+type FolderFormat = Option<ExportFormat>;
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum FramesArg {
-    /// No frames
-    None,
-    /// The frames of the steps that decided a metric
-    Decisive,
-    /// All frames, and the logs
-    #[default]
-    All,
-}
+const FORMATS: [Described<FolderFormat>; 3] = [
+    (None, "bundle", "Everything, as described above"),
+    (
+        Some(ExportFormat::EveryEvalEver),
+        "every-eval-ever",
+        "Results with intervals and a line per episode and rate, for Every Eval Ever 0.3",
+    ),
+    (Some(ExportFormat::InspectScout), "inspect-scout", "A row per episode with its messages, for Inspect Scout"),
+];
+
+const FRAMES: [Described<Frames>; 3] = [
+    (Frames::None, "none", "No frames"),
+    (Frames::Decisive, "decisive", "The frames of the steps that decided a metric"),
+    (Frames::All, "all", "All frames, and the logs"),
+];
 
 /// The answer for a program.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -108,20 +105,13 @@ impl PublishArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let about = self.about.as_deref().map(About::read).transpose()?.unwrap_or_default();
         let study = self.traces.study(&self.scoring, &self.grouping)?;
-        match self.format {
-            FormatArg::Bundle => {}
-            FormatArg::EveryEvalEver => return self.export(&study, ExportFormat::EveryEvalEver, &about),
-            FormatArg::InspectScout => return self.export(&study, ExportFormat::InspectScout, &about),
+        if let Some(format) = self.format {
+            return self.export(&study, format, &about);
         }
-        let frames = match self.frames {
-            FramesArg::None => Frames::None,
-            FramesArg::Decisive => Frames::Decisive,
-            FramesArg::All => Frames::All,
-        };
         let request = PublishRequest {
             out: self.out.clone(),
             style: self.style,
-            frames,
+            frames: self.frames,
             about,
             prompts: self.prompts,
             threads: self.traces.threads.count(),
@@ -151,9 +141,7 @@ impl PublishArgs {
         output::say(&format!("next: `mirrorstats verify {}` computes everything again", answer.out));
         Ok(Outcome::Done)
     }
-}
 
-impl PublishArgs {
     fn export(&self, study: &Study, format: ExportFormat, about: &About) -> Result<Outcome, Failure> {
         let (files, left_out) = formats::export(study, format, about, &self.out, &progress)?;
         let out = self.out.display().to_string();

@@ -101,15 +101,12 @@ mod rows {
                 }
             }
             (Some(format), None) => write(frame, format, io::stdout()).map_err(|error| failed(error.into()))?,
-            (Some(format), Some(path)) => {
-                let file = output::create(path)?;
-                let out = file.as_file().try_clone().map_err(|error| output::unwritable(path, error))?;
-                write_file(frame, format, out).map_err(|error| match error {
-                    WriteError::Output(error) => output::unwritable(path, error),
+            (Some(format), Some(path)) => output::write_file_with(path, |file| {
+                write_file(frame, format, file.try_clone()?).map_err(|error| match error {
+                    WriteError::Output(error) => Failure::Output(error),
                     WriteError::Polars(error) => failed(error.into()),
-                })?;
-                output::commit(file, path)?;
-            }
+                })
+            })?,
         }
         Ok(Outcome::Done)
     }

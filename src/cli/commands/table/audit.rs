@@ -6,7 +6,7 @@ use crate::cli::args::one_of;
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_exact::rounding::Rounding;
 use mirrorstats_report::published::audit::MOST_EPISODES;
-use mirrorstats_study::audit::audit_tables;
+use mirrorstats_study::published::audit_tables;
 
 /// Name the cells of published tables whose mean and standard error no data can give
 #[derive(Clone, Debug, clap::Args)]

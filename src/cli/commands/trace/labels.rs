@@ -3,7 +3,6 @@
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::{Failure, Outcome, output, terminal};
 use mirrorstats_study::agreement::agreement;
-use mirrorstats_study::agreement_text;
 
 const CONFIDENCE: f64 = 0.95;
 
@@ -27,6 +26,6 @@ impl LabelsArgs {
         let scoring = ScoringArgs { condition: self.condition, ..ScoringArgs::default() };
         let study = self.input.study(&scoring, &GroupingArgs::default())?;
         let found = agreement(&study, CONFIDENCE)?;
-        output::print_rendered(&found, self.json, |found| agreement_text(found, terminal::width()))
+        output::print_rendered(&found, self.json, |found| found.render(terminal::width()))
     }
 }

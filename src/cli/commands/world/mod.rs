@@ -18,15 +18,8 @@ use mirrorstats_sim::contact_sheet::{SheetPicture, row};
 use mirrorstats_sim::scene::Scene;
 
 /// Replay episodes, draw film strips, show scenes
-#[derive(Clone, Debug, clap::Args)]
-pub struct WorldArgs {
-    #[command(subcommand)]
-    verb: WorldVerb,
-}
-
-/// The picture to make.
 #[derive(Clone, Debug, clap::Subcommand)]
-enum WorldVerb {
+pub enum WorldCommand {
     Replay(replay::ReplayArgs),
     Filmstrip(filmstrip::FilmstripArgs),
     /// Print the built-in configuration: every size, speed, light and threshold, as TOML for --config
@@ -79,27 +72,27 @@ pub(super) fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure>
     Ok(WorldConfig::load(path)?)
 }
 
-impl WorldArgs {
+impl WorldCommand {
     pub fn run(self) -> Result<Outcome, Failure> {
-        match self.verb {
-            WorldVerb::Replay(args) => args.run(),
-            WorldVerb::Filmstrip(args) => args.run(),
-            WorldVerb::Config => output::plain(WorldConfig::default_text()),
-            WorldVerb::Scene { experiments, seed, run, config } => {
+        match self {
+            Self::Replay(args) => args.run(),
+            Self::Filmstrip(args) => args.run(),
+            Self::Config => output::plain(WorldConfig::default_text()),
+            Self::Scene { experiments, seed, run, config } => {
                 let config = configured(config.as_ref())?;
                 for experiment in experiments.load(&config)? {
                     output::plain(format!("{:#}\n", json!(Scene::draw(&config, experiment, seed, run)?)))?;
                 }
                 Ok(Outcome::Done)
             }
-            WorldVerb::Visibility { experiments, config } => {
+            Self::Visibility { experiments, config } => {
                 let config = configured(config.as_ref())?;
                 let rows =
                     experiments.load(&config)?.into_iter().map(|experiment| visibility::row(&config, &experiment));
                 output::plain(visibility::HEAD.to_owned() + &rows.collect::<Result<String, _>>()?)
             }
             #[cfg(feature = "raster")]
-            WorldVerb::Sheet { out, experiment, seed, config: file } => {
+            Self::Sheet { out, experiment, seed, config: file } => {
                 let config = configured(file.as_ref())?;
                 let target = out.join("sheet.png");
                 output::check_target(&target, &file)?;

@@ -7,10 +7,13 @@ use std::sync::LazyLock;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color as _, FontDesc, FontFamily, FontStyle, FontTransform, TextStyle};
 use ttf_parser::Face;
 
 use super::palette::PALETTE;
 use super::sheet::Rgb;
+use super::svg::size_units;
 use mirrorstats_exact::escape::visible;
 
 /// The empty margin of every figure, px.
@@ -79,6 +82,18 @@ impl Lettering {
 
     pub(crate) const fn upwards(self) -> Self {
         Self { upwards: true, ..self }
+    }
+
+    pub(super) fn style(self) -> TextStyle<'static> {
+        let style = if self.weight == Weight::Semibold { FontStyle::Bold } else { FontStyle::Normal };
+        let turn = if self.upwards { FontTransform::Rotate270 } else { FontTransform::None };
+        let anchor = match self.align {
+            TextAnchor::Start => HPos::Left,
+            TextAnchor::Middle => HPos::Center,
+            TextAnchor::End => HPos::Right,
+        };
+        let font = FontDesc::new(FontFamily::Name(FAMILY), f64::from(size_units(self.size)), style).transform(turn);
+        TextStyle { font, color: self.color.to_backend_color(), pos: Pos::new(anchor, VPos::Center) }
     }
 
     /// The width of `text` on one line, px.

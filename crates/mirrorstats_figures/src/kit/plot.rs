@@ -2,9 +2,14 @@
 
 use std::ops::Range;
 
+use plotters::coord::CoordTranslate;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::ranged1d::{BoldPoints, Ranged};
+use plotters::coord::types::RangedCoordf64;
+
 use super::lettering::{self, TextAnchor};
 use super::palette::PALETTE;
-use super::sheet::{Frame, Point, Sheet, Stroke, many};
+use super::sheet::{Frame, Point, Sheet, Stroke};
 use super::svg::{px, units};
 
 /// Room for the numbers and the title of an axis, px.
@@ -14,8 +19,7 @@ pub(crate) const ROOM_BELOW: f64 = 28.0;
 /// Two linear axes over a frame; y points up.
 pub(crate) struct Plot {
     pub frame: Frame,
-    x: Range<f64>,
-    y: Range<f64>,
+    axes: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -26,20 +30,22 @@ pub(crate) struct Tick {
 }
 
 impl Plot {
-    pub(crate) const fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
-        Self { frame, x, y }
+    pub(crate) fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
+        let [(left, top), (right, bottom)] = [(frame.left, frame.top), (frame.right(), frame.bottom())].map(units);
+        Self { frame, axes: Cartesian2d::new(x, y, (left..right, bottom..top)) }
     }
 
     pub(crate) fn at(&self, x: f64, y: f64) -> Point {
-        (self.x(x), self.y(y))
+        let (x, y) = self.axes.translate(&(x, y));
+        (px(x), px(y))
     }
 
     pub(crate) fn x(&self, value: f64) -> f64 {
-        along(&self.x, value, [self.frame.left, self.frame.right()])
+        self.at(value, 0.0).0
     }
 
     pub(crate) fn y(&self, value: f64) -> f64 {
-        along(&self.y, value, [self.frame.bottom(), self.frame.top])
+        self.at(0.0, value).1
     }
 
     pub(crate) fn axes(&self, sheet: &mut Sheet, x: (&[Tick], &str), y: (&[Tick], &str)) {
@@ -88,14 +94,6 @@ impl Plot {
     }
 }
 
-/// The position of `value` between two ends, px: the whole unit towards the first end.
-fn along(values: &Range<f64>, value: f64, ends: [f64; 2]) -> f64 {
-    let [first, last] = ends.map(|end| f64::from(units(end)));
-    let away = (last - first) * ((value - values.start) / (values.end - values.start));
-    // A value on a unit stays there, in spite of the last bits of floats.
-    px(first + if last > first { (away + 1e-3).floor() } else { (away - 1e-3).ceil() })
-}
-
 /// The quarters of an axis from 0 to 1; only 0, a half and 1 have a text.
 pub(crate) fn quarters(zero: &str, half: &str, one: &str) -> [Tick; 5] {
     let tick = |(at, text): (f64, &str)| Tick { at, text: text.to_owned() };
@@ -108,10 +106,9 @@ pub(crate) fn rate_ticks() -> [Tick; 5] {
 
 /// At most `most` integers from 0 to `last`, at even distances.
 pub(crate) fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
-    let last = last as usize;
-    let mut steps = (0..).flat_map(|power| [1, 2, 5].map(|first| first * 10_usize.pow(power)));
-    let step = steps.find(|step| last / step < most).unwrap_or(usize::MAX);
-    (0..=last).step_by(step).map(|at| Tick { at: many(at), text: at.to_string() }).collect()
+    let axis = RangedCoordf64::from(0.0..f64::from(last));
+    let whole = axis.key_points(BoldPoints(most)).into_iter().filter(|at| at.fract() == 0.0);
+    whole.map(|at| Tick { at, text: at.to_string() }).collect()
 }
 
 fn grid() -> Stroke {

@@ -1,14 +1,21 @@
-//! The sheet of a figure: SVG elements in px from the top left corner, and groups that carry values.
+//! The sheet of a figure: plotters' elements in px from the top left corner, and groups that carry values.
 
 use std::borrow::Cow;
+use std::cell::RefCell;
 use std::fmt::{self, Write as _};
+use std::rc::Rc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use plotters::coord::Shift;
+use plotters::drawing::DrawingArea;
+use plotters::element::{Circle, Drawable, PathElement, PointCollection, Polygon, Rectangle, Text};
+use plotters::style::{Color, ShapeStyle};
+use plotters_backend::{BackendColor, BackendCoord};
 use serde::Deserialize;
 
-use super::lettering::{self, Lettering, TextAnchor, Weight};
-use super::svg::{corner, escaped, path, px, units};
+use super::lettering::{self, Lettering};
+use super::svg::{SvgBackend, escaped, px, size_units, units};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::fixed;
 use mirrorstats_exact::number::full_precision;
@@ -75,6 +82,12 @@ impl fmt::Display for Rgb {
     }
 }
 
+impl Color for Rgb {
+    fn to_backend_color(&self) -> BackendColor {
+        BackendColor { rgb: (self.0, self.1, self.2), alpha: 1.0 }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
     pub color: Rgb,
@@ -110,78 +123,61 @@ impl Fill {
     pub(crate) const fn outlined(color: Rgb, outline: Rgb, width: f64) -> Self {
         Self { color, opacity: 1.0, outline: Some((outline, width)) }
     }
-}
 
-/// The attributes of a filled shape.
-impl fmt::Display for Fill {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "fill=\"{}\"", self.color)?;
-        if self.opacity < 1.0 {
-            write!(f, " fill-opacity=\"{}\"", self.opacity)?;
-        }
-        self.outline.map_or(Ok(()), |(color, width)| write!(f, " stroke=\"{color}\" stroke-width=\"{width}\""))
+    fn style(self) -> ShapeStyle {
+        self.color.mix(self.opacity).filled()
+    }
+
+    /// The outline as attributes: plotters either fills a shape or draws its outline.
+    fn outline_attributes(self) -> String {
+        let outline = self.outline.map(|(color, width)| format!(" stroke=\"{color}\" stroke-width=\"{width}\""));
+        outline.unwrap_or_default()
     }
 }
 
 /// A figure in progress. Elements below its final height must not be drawn.
 #[derive(Debug)]
 pub struct Sheet {
-    body: String,
+    svg: Rc<RefCell<SvgBackend>>,
     pub(crate) width: f64,
 }
 
 impl Sheet {
-    pub const fn new(width: f64) -> Self {
-        Self { body: String::new(), width }
+    pub fn new(width: f64) -> Self {
+        Self { svg: Rc::default(), width }
     }
 
     /// The elements that were drawn, as SVG.
     pub(crate) fn into_body(self) -> String {
-        self.body
+        self.svg.take().body
     }
 
     pub fn line(&mut self, points: &[Point], Stroke { color, width, dash }: Stroke) {
+        let points: Vec<_> = points.iter().copied().map(units).collect();
         let dash = dash.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
         let dash = if dash.is_empty() { dash } else { format!(" stroke-dasharray=\"{dash}\"") };
-        let (path, width) = (path(points), px(units(width)));
-        self.write(format_args!(
-            "<path d=\"{path}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"{width}\"{dash}/>"
-        ));
+        self.draw(&PathElement::new(points, color.stroke_width(size_units(width))), dash);
     }
 
     pub(crate) fn polygon(&mut self, corners: &[Point], fill: Fill) {
-        self.write(format_args!("<path d=\"{}Z\" {fill}/>", path(corners)));
+        let corners: Vec<_> = corners.iter().copied().map(units).collect();
+        self.draw(&Polygon::new(corners, fill.style()), fill.outline_attributes());
     }
 
     pub fn rectangle(&mut self, frame: Frame, fill: Fill) {
-        let [(left, top), (right, bottom)] = [(frame.left, frame.top), (frame.right(), frame.bottom())].map(corner);
-        let (x, y) = (px(left.min(right)), px(top.min(bottom)));
-        let (width, height) = (px((right - left).abs()), px((bottom - top).abs()));
-        self.write(format_args!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" {fill}/>"));
+        let corners = [(frame.left, frame.top), (frame.right(), frame.bottom())].map(units);
+        self.draw(&Rectangle::new(corners, fill.style()), fill.outline_attributes());
     }
 
     pub(crate) fn circle(&mut self, center: Point, radius: f64, fill: Fill) {
-        let ((x, y), radius) = (corner(center), px(units(radius)));
-        self.write(format_args!("<circle cx=\"{}\" cy=\"{}\" r=\"{radius}\" {fill}/>", px(x), px(y)));
+        self.draw(&Circle::new(units(center), size_units(radius), fill.style()), fill.outline_attributes());
     }
 
     /// Draws one line of text, with the middle of its capitals at the height of `at`.
     pub fn text(&mut self, (x, y): Point, text: &str, lettering: Lettering) {
-        let Lettering { size, weight, color, align, upwards } = lettering;
-        let drop = lettering::drop_to_baseline(size);
-        let (x, y) = corner(if upwards { (x + drop, y) } else { (x, y + drop) });
-        let (x, y, size) = (px(x), px(y), px(units(size)));
-        let weight = if weight == Weight::Semibold { " font-weight=\"600\"" } else { "" };
-        let anchor = match align {
-            TextAnchor::Start => "",
-            TextAnchor::Middle => " text-anchor=\"middle\"",
-            TextAnchor::End => " text-anchor=\"end\"",
-        };
-        let turn = if upwards { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
-        let text = escaped(&lettering::drawable(text));
-        self.write(format_args!(
-            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\"{weight}{anchor}{turn} fill=\"{color}\">{text}</text>"
-        ));
+        let drop = lettering::drop_to_baseline(lettering.size);
+        let at = if lettering.upwards { (x + drop, y) } else { (x, y + drop) };
+        self.draw(&Text::new(lettering::drawable(text), units(at), lettering.style()), String::new());
     }
 
     /// Draws filled rectangles side by side, with the same top and height: pairs of left and right ends, ascending.
@@ -190,16 +186,17 @@ impl Sheet {
         let mut path = String::new();
         let mut at = None;
         for &(left, right) in ends {
-            let (left, right) = (units(left), units(right));
+            let (left, y) = units((left, top + height / 2.0));
+            let (right, _) = units((right, top));
             let _ = match at {
-                None => write!(path, "M{} {}", px(left), px(units(top + height / 2.0))),
+                None => write!(path, "M{} {}", px(left), px(y)),
                 Some(at) => write!(path, "m{} 0", px(left - at)),
             };
             let _ = write!(path, "h{}", px(right - left));
             at = Some(right);
         }
         if at.is_some() {
-            let width = px(units(height));
+            let width = px(size_units(height));
             self.write(format_args!("<path d=\"{path}\" stroke=\"{color}\" stroke-width=\"{width}\"/>"));
         }
     }
@@ -222,8 +219,19 @@ impl Sheet {
         self.write(format_args!("</g>"));
     }
 
-    fn write(&mut self, line: fmt::Arguments<'_>) {
-        let _ = writeln!(self.body, "{line}");
+    fn draw<E>(&self, element: &E, extra: String)
+    where
+        for<'a> &'a E: PointCollection<'a, BackendCoord>,
+        E: Drawable<SvgBackend>,
+    {
+        self.svg.borrow_mut().extra = extra;
+        let area: DrawingArea<SvgBackend, Shift> = (&self.svg).into();
+        area.draw(element).expect("writing to a string does not fail, and nobody else holds the backend");
+    }
+
+    /// Writes a line that plotters has no element for.
+    fn write(&self, line: fmt::Arguments<'_>) {
+        let _ = writeln!(self.svg.borrow_mut().body, "{line}");
     }
 }
 

@@ -77,18 +77,18 @@ impl Moments {
     }
 }
 
-/// The standard deviation behind the standard error of the mean.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum StandardError {
-    /// The sample standard deviation (ddof = 1); undefined for n = 1.
-    #[default]
-    Sample,
-    /// The population standard deviation (ddof = 0).
-    Population,
+crate::names! {
+    /// The standard deviation behind the standard error of the mean.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "lowercase")]
+    pub enum StandardError {
+        /// The sample standard deviation (ddof = 1); undefined for n = 1.
+        #[default]
+        Sample = "sample",
+        /// The population standard deviation (ddof = 0).
+        Population = "population",
+    }
 }
-
-crate::names!(StandardError { Sample: "sample", Population: "population" });
 
 #[cfg(test)]
 mod tests {

@@ -1,8 +1,20 @@
 //! Enums with named variants.
 
-/// Gives an enum `ALL` (its variants in order), `name`, and `named` (the variant with a name).
+/// Declares an enum whose variants have names, and gives it `ALL` (its variants in order), `name`, and `named` (the
+/// variant with a name).
 #[macro_export]
 macro_rules! names {
+    (
+        $(#[$about:meta])*
+        $visibility:vis enum $type:ident { $($(#[$word:meta])* $variant:ident = $name:literal),+ $(,)? }
+    ) => {
+        $(#[$about])*
+        $visibility enum $type {
+            $($(#[$word])* $variant,)+
+        }
+
+        $crate::names!($type { $($variant: $name,)+ });
+    };
     ($type:ident { $($variant:ident: $name:literal),+ $(,)? }) => {
         impl $type {
             pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];

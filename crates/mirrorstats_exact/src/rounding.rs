@@ -8,29 +8,23 @@ use serde::{Deserialize, Serialize};
 
 use super::number::{Decimal, power_of_ten};
 
-/// The rounding of an exact number for print.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Rounding {
-    /// The exact value once, ties to even.
-    HalfEven,
-    /// The exact value once, ties away from zero.
-    HalfUp,
-    /// The nearest binary float once, as `printf` and Python print it.
-    Binary,
-    /// The nearest binary float to one digit more, then that text with ties away from zero.
-    Twice,
-    /// Digits cut off.
-    Truncate,
+crate::names! {
+    /// The rounding of an exact number for print.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Rounding {
+        /// The exact value once, ties to even.
+        HalfEven = "half-even",
+        /// The exact value once, ties away from zero.
+        HalfUp = "half-up",
+        /// The nearest binary float once, as `printf` and Python print it.
+        Binary = "binary",
+        /// The nearest binary float to one digit more, then that text with ties away from zero.
+        Twice = "twice",
+        /// Digits cut off.
+        Truncate = "truncate",
+    }
 }
-
-crate::names!(Rounding {
-    HalfEven: "half-even",
-    HalfUp: "half-up",
-    Binary: "binary",
-    Twice: "twice",
-    Truncate: "truncate",
-});
 
 impl Rounding {
     /// `above / below` as printed. `None` if `below` is not positive, or if 128 bits do not suffice.

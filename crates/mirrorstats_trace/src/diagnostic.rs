@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use mirrorstats_exact::budget::Exceeded;
 use mirrorstats_exact::escape::visible;
+use mirrorstats_exact::names;
 
 pub const MORE_FILES: &str = "raise the limit of open files, as in `ulimit -n 1024`, and run the command again";
 
@@ -54,92 +55,84 @@ pub enum Severity {
     Note,
 }
 
-macro_rules! codes {
-    ($(#[$doc:meta] $code:ident: $name:literal,)+) => {
-        /// A rule of the schema; the name in kebab case is stable.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-        #[serde(rename_all = "kebab-case")]
-        pub enum Code {
-            $(#[$doc] $code,)+
-        }
-
-        mirrorstats_exact::names!(Code { $($code: $name,)+ });
-    };
-}
-
-codes! {
-    /// The file cannot be opened or read.
-    Unreadable: "unreadable",
-    /// The file has no bytes.
-    EmptyFile: "empty-file",
-    /// The file is not Parquet.
-    NotParquet: "not-parquet",
-    /// The file starts as Parquet and ends before its footer.
-    Truncated: "truncated",
-    /// The footer is there and makes no sense.
-    CorruptFooter: "corrupt-footer",
-    /// The footer is good and the data behind it is not.
-    CorruptData: "corrupt-data",
-    /// Reading the file would take more work than files of its size do.
-    OverBudget: "over-budget",
-    /// The footer's metadata of mirrorstats cannot be read.
-    InvalidMetadata: "invalid-metadata",
-    /// The file was written under a newer schema.
-    NewerSchema: "newer-schema",
-    /// A required column is not there.
-    MissingColumn: "missing-column",
-    /// Two columns have the same name.
-    RepeatedColumn: "repeated-column",
-    /// A column of the schema has another type.
-    WrongType: "wrong-type",
-    /// The file has no row.
-    NoEpisodes: "no-episodes",
-    /// A column that is never null has a null.
-    NullInRequired: "null-in-required",
-    /// A name is the empty string.
-    EmptyString: "empty-string",
-    /// An integer does not fit the column's type.
-    OutOfRange: "out-of-range",
-    /// A number of pixels, tokens, ... is below zero.
-    NegativeCount: "negative-count",
-    /// An episode's first t is not 1.
-    TStart: "t-start",
-    /// An episode's t leaves numbers out.
-    TGap: "t-gap",
-    /// An episode has the same t twice in a row.
-    TDuplicate: "t-duplicate",
-    /// An episode's t goes backward.
-    TOrder: "t-order",
-    /// A value that names the episode or its setting changes within it.
-    InconsistentConstant: "inconsistent-constant",
-    /// The rows of an episode are not together, or two episodes of a file share an id.
-    EpisodeTwice: "episode-twice",
-    /// Two files have an episode of the same id.
-    EpisodeInTwoFiles: "episode-in-two-files",
-    /// The experiment is none that the definitions know.
-    UnknownExperiment: "unknown-experiment",
-    /// The action is none of the five.
-    UnknownAction: "unknown-action",
-    /// The reply status is none of the schema's.
-    UnknownReplyStatus: "unknown-reply-status",
-    /// A text is none of those that the definitions declare.
-    UnknownValue: "unknown-value",
-    /// A colour is not spelled as colours are, or none of the palette.
-    InvalidColor: "invalid-color",
-    /// A claimed colour is no body's and no cube's in all inputs.
-    UnseenColor: "unseen-color",
-    /// The checksums in the footer are those of the file that this one was made from.
-    StaleChecksums: "stale-checksums",
-    /// A title, an order or a level of an experiment is another in the definitions than in the footer.
-    ExperimentOverridden: "experiment-overridden",
-    /// A level of an experiment in the footer is one of no metric of the definitions.
-    UnknownLevel: "unknown-level",
-    /// An episode's rows are in more than one row group.
-    SplitEpisode: "split-episode",
-    /// Replies of the file gave no decision.
-    UnreadableReplies: "unreadable-replies",
-    /// All rows of an episode are those of another one, the id aside.
-    CopiedEpisode: "copied-episode",
+names! {
+    /// A rule of the schema; the name in kebab case is stable.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Code {
+        /// The file cannot be opened or read.
+        Unreadable = "unreadable",
+        /// The file has no bytes.
+        EmptyFile = "empty-file",
+        /// The file is not Parquet.
+        NotParquet = "not-parquet",
+        /// The file starts as Parquet and ends before its footer.
+        Truncated = "truncated",
+        /// The footer is there and makes no sense.
+        CorruptFooter = "corrupt-footer",
+        /// The footer is good and the data behind it is not.
+        CorruptData = "corrupt-data",
+        /// Reading the file would take more work than files of its size do.
+        OverBudget = "over-budget",
+        /// The footer's metadata of mirrorstats cannot be read.
+        InvalidMetadata = "invalid-metadata",
+        /// The file was written under a newer schema.
+        NewerSchema = "newer-schema",
+        /// A required column is not there.
+        MissingColumn = "missing-column",
+        /// Two columns have the same name.
+        RepeatedColumn = "repeated-column",
+        /// A column of the schema has another type.
+        WrongType = "wrong-type",
+        /// The file has no row.
+        NoEpisodes = "no-episodes",
+        /// A column that is never null has a null.
+        NullInRequired = "null-in-required",
+        /// A name is the empty string.
+        EmptyString = "empty-string",
+        /// An integer does not fit the column's type.
+        OutOfRange = "out-of-range",
+        /// A number of pixels, tokens, ... is below zero.
+        NegativeCount = "negative-count",
+        /// An episode's first t is not 1.
+        TStart = "t-start",
+        /// An episode's t leaves numbers out.
+        TGap = "t-gap",
+        /// An episode has the same t twice in a row.
+        TDuplicate = "t-duplicate",
+        /// An episode's t goes backward.
+        TOrder = "t-order",
+        /// A value that names the episode or its setting changes within it.
+        InconsistentConstant = "inconsistent-constant",
+        /// The rows of an episode are not together, or two episodes of a file share an id.
+        EpisodeTwice = "episode-twice",
+        /// Two files have an episode of the same id.
+        EpisodeInTwoFiles = "episode-in-two-files",
+        /// The experiment is none that the definitions know.
+        UnknownExperiment = "unknown-experiment",
+        /// The action is none of the five.
+        UnknownAction = "unknown-action",
+        /// The reply status is none of the schema's.
+        UnknownReplyStatus = "unknown-reply-status",
+        /// A text is none of those that the definitions declare.
+        UnknownValue = "unknown-value",
+        /// A colour is not spelled as colours are, or none of the palette.
+        InvalidColor = "invalid-color",
+        /// A claimed colour is no body's and no cube's in all inputs.
+        UnseenColor = "unseen-color",
+        /// The checksums in the footer are those of the file that this one was made from.
+        StaleChecksums = "stale-checksums",
+        /// A title, an order or a level of an experiment is another in the definitions than in the footer.
+        ExperimentOverridden = "experiment-overridden",
+        /// A level of an experiment in the footer is one of no metric of the definitions.
+        UnknownLevel = "unknown-level",
+        /// An episode's rows are in more than one row group.
+        SplitEpisode = "split-episode",
+        /// Replies of the file gave no decision.
+        UnreadableReplies = "unreadable-replies",
+        /// All rows of an episode are those of another one, the id aside.
+        CopiedEpisode = "copied-episode",
+    }
 }
 
 #[derive(Deserialize)]

@@ -53,23 +53,25 @@ pub struct Step {
     pub extra: Extra,
 }
 
-/// An agent's action: the five actions of the study, and the six of a hand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Action {
-    MoveForward,
-    MoveBackward,
-    /// 30 degrees counter-clockwise.
-    TurnLeft,
-    /// 30 degrees clockwise.
-    TurnRight,
-    /// The decision, which ends the episode for the agent.
-    Done,
-    HandUp,
-    HandDown,
-    HandLeft,
-    HandRight,
-    HandForward,
-    HandBackward,
+mirrorstats_exact::names! {
+    /// An agent's action: the five actions of the study, and the six of a hand.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub enum Action {
+        MoveForward = "move_forward",
+        MoveBackward = "move_backward",
+        /// 30 degrees counter-clockwise.
+        TurnLeft = "turn_left",
+        /// 30 degrees clockwise.
+        TurnRight = "turn_right",
+        /// The decision, which ends the episode for the agent.
+        Done = "done",
+        HandUp = "hand_up",
+        HandDown = "hand_down",
+        HandLeft = "hand_left",
+        HandRight = "hand_right",
+        HandForward = "hand_forward",
+        HandBackward = "hand_backward",
+    }
 }
 
 impl Action {
@@ -80,20 +82,6 @@ impl Action {
     pub const HAND: [Self; 6] =
         [Self::HandUp, Self::HandDown, Self::HandLeft, Self::HandRight, Self::HandForward, Self::HandBackward];
 }
-
-mirrorstats_exact::names!(Action {
-    MoveForward: "move_forward",
-    MoveBackward: "move_backward",
-    TurnLeft: "turn_left",
-    TurnRight: "turn_right",
-    Done: "done",
-    HandUp: "hand_up",
-    HandDown: "hand_down",
-    HandLeft: "hand_left",
-    HandRight: "hand_right",
-    HandForward: "hand_forward",
-    HandBackward: "hand_backward",
-});
 
 macro_rules! optional {
     ($(#[$about:meta])+ $name:ident { $($field:ident: $type:ty,)+ }) => {

@@ -13,19 +13,19 @@ use crate::beside::lost::LostEpisode;
 use crate::read::open::TraceSet;
 use mirrorstats_exact::names;
 
-/// The origin of rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Origin {
-    /// This program recorded them.
-    Recording,
-    /// They were imported from another harness.
-    Import,
-    /// They were rebuilt from published numbers: what those leave open is arbitrary.
-    Reconstruction,
+names! {
+    /// The origin of rows.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Origin {
+        /// This program recorded them.
+        Recording = "recording",
+        /// They were imported from another harness.
+        Import = "import",
+        /// They were rebuilt from published numbers: what those leave open is arbitrary.
+        Reconstruction = "reconstruction",
+    }
 }
-
-names!(Origin { Recording: "recording", Import: "import", Reconstruction: "reconstruction" });
 
 /// The unit that similar episodes share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]

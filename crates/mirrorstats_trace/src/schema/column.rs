@@ -86,52 +86,38 @@ pub struct ColorColumn {
     pub(super) advice: Text,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Stored {
-    #[default]
-    Bool,
-    Int8,
-    Int32,
-    Int64,
-    Float32,
-    Float64,
-    String,
+mirrorstats_exact::names! {
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Stored {
+        #[default]
+        Bool = "bool",
+        Int8 = "int8",
+        Int32 = "int32",
+        Int64 = "int64",
+        Float32 = "float32",
+        Float64 = "float64",
+        String = "string",
+    }
 }
 
-/// The logical type of a column as a reader sees it, whatever its width or encoding in the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// True or false.
-    Bool,
-    /// An integer, read as 64 bits signed.
-    Int,
-    /// A floating-point number, read as 64 bits.
-    Float,
-    /// Text.
-    String,
-    /// Anything else: kept in the file, and of no use to a definition.
-    Unsupported,
+mirrorstats_exact::names! {
+    /// The logical type of a column as a reader sees it, whatever its width or encoding in the file.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Kind {
+        /// True or false.
+        Bool = "bool",
+        /// An integer, read as 64 bits signed.
+        Int = "integer",
+        /// A floating-point number, read as 64 bits.
+        Float = "float",
+        /// Text.
+        String = "string",
+        /// Anything else: kept in the file, and of no use to a definition.
+        Unsupported = "unsupported",
+    }
 }
-
-mirrorstats_exact::names!(Kind {
-    Bool: "bool",
-    Int: "integer",
-    Float: "float",
-    String: "string",
-    Unsupported: "unsupported"
-});
-
-mirrorstats_exact::names!(Stored {
-    Bool: "bool",
-    Int8: "int8",
-    Int32: "int32",
-    Int64: "int64",
-    Float32: "float32",
-    Float64: "float64",
-    String: "string",
-});
 
 impl Kind {
     /// The widest type of its values, as writers and checks hold them.

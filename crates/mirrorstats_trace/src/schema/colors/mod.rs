@@ -16,34 +16,23 @@ use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spe
 pub use super::column::ColorColumn;
 use crate::schema;
 
-/// A colour of the palette.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Color {
-    Blue,
-    Brown,
-    Cyan,
-    Green,
-    Orange,
-    Pink,
-    Purple,
-    Red,
-    White,
-    Yellow,
+mirrorstats_exact::names! {
+    /// A colour of the palette.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Color {
+        Blue = "blue",
+        Brown = "brown",
+        Cyan = "cyan",
+        Green = "green",
+        Orange = "orange",
+        Pink = "pink",
+        Purple = "purple",
+        Red = "red",
+        White = "white",
+        Yellow = "yellow",
+    }
 }
-
-mirrorstats_exact::names!(Color {
-    Blue: "blue",
-    Brown: "brown",
-    Cyan: "cyan",
-    Green: "green",
-    Orange: "orange",
-    Pink: "pink",
-    Purple: "purple",
-    Red: "red",
-    White: "white",
-    Yellow: "yellow",
-});
 
 impl Color {
     /// The paint of this colour: red, green and blue. Shading makes it darker in a picture.

@@ -155,7 +155,7 @@ impl Contents {
             (Encoding::RLE, Physical::BOOLEAN) => {
                 let truths = prefixed(values).and_then(|(truths, _)| Hybrid::new(truths, 1, count));
                 let sound = truths.and_then(|mut truths| {
-                    each_span(&mut truths, count, |_| ())?;
+                    truths.each_span(count, |_| ())?;
                     truths.finish_values()
                 });
                 sound.map_err(|Unsupported| ("a truth value for each row", "runs of another length".into()))
@@ -187,7 +187,7 @@ impl Contents {
         let mut hybrid =
             Hybrid::new(values.slice(1..), width, count).map_err(|Unsupported| fault("keys of over 32 bits"))?;
         let (mut within, texts) = (true, &mut self.texts);
-        each_span(&mut hybrid, count, |span| match span {
+        let taken = hybrid.each_span(count, |span| match span {
             Span::Same { value, count } => {
                 within &= (value as usize) < keys;
                 texts.key(value, count);
@@ -196,9 +196,8 @@ impl Contents {
                 within &= (key as usize) < keys;
                 texts.key(key, 1);
             }),
-        })
-        .and_then(|()| hybrid.finish_values())
-        .map_err(|Unsupported| fault("runs of another length"))?;
+        });
+        taken.and_then(|()| hybrid.finish_values()).map_err(|Unsupported| fault("runs of another length"))?;
         if within { Ok(()) } else { Err(fault("a key beyond it")) }
     }
 
@@ -223,27 +222,18 @@ fn no_levels(stored: Bytes, rows: usize) -> Result<(), ContentFault> {
     }
     let mut hybrid =
         Hybrid::new(stored, 0, rows).map_err(|Unsupported| levels("runs of another length, or levels above 1"))?;
-    let over = each_span(&mut hybrid, rows, |_| ()).and_then(|()| hybrid.finish());
+    let over = hybrid.each_span(rows, |_| ()).and_then(|()| hybrid.finish());
     over.map_err(|Unsupported| levels("some above 0"))
 }
 
 fn ones(stored: Bytes, count: usize) -> Result<usize, Unsupported> {
     let mut ones = 0;
     let mut hybrid = Hybrid::new(stored, 1, count)?;
-    each_span(&mut hybrid, count, |span| match span {
+    hybrid.each_span(count, |span| match span {
         Span::Same { value, count } => ones += value as usize * count,
         Span::Packed(packed) => packed.each(|bit| ones += bit as usize),
     })?;
     hybrid.finish().map(|()| ones)
-}
-
-fn each_span(hybrid: &mut Hybrid, mut count: usize, mut take: impl FnMut(Span<'_>)) -> Result<(), Unsupported> {
-    while count > 0 {
-        let span = hybrid.span(count)?;
-        count -= span.count();
-        take(span);
-    }
-    Ok(())
 }
 
 fn other_bytes(values: &[u8], count: usize, width: usize) -> ContentFault {

@@ -12,7 +12,7 @@ use parquet::column::page::{Page, PageReader as _};
 use super::dictionary::Dictionary;
 use super::rle::{Hybrid, Number, Span, prefixed};
 use crate::bits::Bits;
-use crate::column::{Column, Runs};
+use crate::column::{Column, Runs, narrow};
 use crate::error::{FaultSlot, Unsupported};
 use crate::stored::bytes::{Place, Store};
 use crate::stored::reader::Pages;
@@ -121,7 +121,13 @@ impl Cursor {
         let mut stretches = Stretches::default();
         self.rows(count, |stored, rows, values| {
             // Nulls among rows read as runs are rare, so the library decodes them.
-            if rows == values { stored.runs(values, &mut stretches) } else { Err(Unsupported) }
+            if rows != values {
+                return Err(Unsupported);
+            }
+            stored.hybrid()?.each_span(values, |span| match span {
+                Span::Same { value, count } => stretches.add(value.cast_signed(), count),
+                Span::Packed(packed) => packed.blocks(|values| stretches.add_each(values)),
+            })
         })?;
         Ok(Column::Runs(Runs::new(self.dictionary()?.values(stretches.keys, None)?, stretches.ends)))
     }
@@ -151,7 +157,7 @@ impl Cursor {
             let rows = left.min(page.rows);
             page.rows -= rows;
             let values = match (&mut page.levels, &mut nulls) {
-                (Some(levels), Some(nulls)) => validity(levels, rows, nulls)?,
+                (Some(levels), Some(nulls)) => append(levels, rows, nulls)?,
                 _ => rows,
             };
             page.valid += values;
@@ -279,23 +285,7 @@ impl Stored {
         }
     }
 
-    fn runs(&mut self, mut count: usize, runs: &mut Stretches) -> Result<(), Unsupported> {
-        while count > 0 {
-            match self.hybrid()?.span(count)? {
-                Span::Same { value, count: same } => {
-                    runs.add(value.cast_signed(), same)?;
-                    count -= same;
-                }
-                Span::Packed(packed) => {
-                    packed.blocks(|values| runs.add_each(values))?;
-                    count -= packed.count;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn bits(&mut self, mut count: usize, bits: &mut Bits) -> Result<(), Unsupported> {
+    fn bits(&mut self, count: usize, bits: &mut Bits) -> Result<(), Unsupported> {
         match self {
             Self::Bits(data, at) => {
                 let end = *at + count;
@@ -304,20 +294,16 @@ impl Stored {
                 }
                 bits.append(data, *at, count);
                 *at = end;
+                Ok(())
             }
-            Self::Hybrid(hybrid) => {
-                while count > 0 {
-                    count -= append(hybrid.span(count)?, bits).0;
-                }
-            }
+            Self::Hybrid(hybrid) => append(hybrid, count, bits).map(drop),
         }
-        Ok(())
     }
 }
 
 impl Stretches {
-    fn add(&mut self, key: i32, count: usize) -> Result<(), Unsupported> {
-        let count = u32::try_from(count).map_err(|_| Unsupported)?;
+    fn add(&mut self, key: i32, count: usize) {
+        let count = narrow(count);
         match (self.keys.last(), self.ends.last_mut()) {
             (Some(last), Some(end)) if *last == key => *end += count,
             (_, end) => {
@@ -326,38 +312,29 @@ impl Stretches {
                 self.ends.push(before + count);
             }
         }
-        Ok(())
     }
 
-    fn add_each(&mut self, keys: &[i32]) -> Result<(), Unsupported> {
+    fn add_each(&mut self, keys: &[i32]) {
         // Most of the time all keys belong to one or two episodes.
-        keys.chunk_by(|a, b| a == b).try_for_each(|same| self.add(same[0], same.len()))
+        keys.chunk_by(|a, b| a == b).for_each(|same| self.add(same[0], same.len()));
     }
 }
 
-/// Adds one-bit numbers. Returns their number, and the number of ones.
-fn append(span: Span<'_>, out: &mut Bits) -> (usize, usize) {
-    match span {
+/// Adds one-bit numbers. Returns the number of ones.
+fn append(numbers: &mut Hybrid, count: usize, out: &mut Bits) -> Result<usize, Unsupported> {
+    let mut ones = 0;
+    numbers.each_span(count, |span| match span {
         Span::Same { value, count } => {
             // A number of one bit: wider runs are refused.
             out.fill(count, value == 1);
-            (count, if value == 1 { count } else { 0 })
+            ones += value as usize * count;
         }
         Span::Packed(packed) => {
             let (data, start) = packed.bits();
-            (packed.count, out.append(data, start, packed.count))
+            ones += out.append(data, start, packed.count);
         }
-    }
-}
-
-fn validity(levels: &mut Hybrid, count: usize, nulls: &mut Bits) -> Result<usize, Unsupported> {
-    let (mut left, mut valid) = (count, 0);
-    while left > 0 {
-        let (rows, ones) = append(levels.span(left)?, nulls);
-        left -= rows;
-        valid += ones;
-    }
-    Ok(valid)
+    })?;
+    Ok(ones)
 }
 
 /// Moves values, which are stored without nulls between them, to their rows.

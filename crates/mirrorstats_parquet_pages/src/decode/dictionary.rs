@@ -3,8 +3,8 @@ use std::sync::Arc;
 use arrow::array::{
     Array as _, ArrayRef, AsArray as _, DictionaryArray, Int32Array, Int64Array, StringBuilder, UInt8Array,
 };
-use arrow::buffer::{NullBuffer, ScalarBuffer};
-use arrow::datatypes::{Int32Type, Int64Type};
+use arrow::buffer::NullBuffer;
+use arrow::compute::{TakeOptions, take};
 
 use crate::column::Keys;
 use crate::error::Unsupported;
@@ -46,22 +46,11 @@ impl Dictionary {
 
     /// The values of keys; the key of a null is 0.
     pub(crate) fn values(&self, keys: Vec<i32>, nulls: Option<NullBuffer>) -> Result<ArrayRef, Unsupported> {
-        let Some(ints) = self.0.as_primitive_opt::<Int64Type>() else {
-            let keys = Int32Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
-            let column = DictionaryArray::<Int32Type>::try_new(keys, Arc::clone(&self.0)).map_err(|_| Unsupported)?;
+        let keys = Int32Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
+        if self.0.as_string_opt::<i32>().is_some() {
+            let column = DictionaryArray::try_new(keys, Arc::clone(&self.0)).map_err(|_| Unsupported)?;
             return Ok(Arc::new(column));
-        };
-        let mut within = true;
-        let value = |key: &i32| {
-            let value = usize::try_from(*key).ok().and_then(|key| ints.values().get(key));
-            within &= value.is_some();
-            value.copied().unwrap_or_default()
-        };
-        let values: ScalarBuffer<i64> = keys.iter().map(value).collect();
-        let all_null = || nulls.as_ref().is_some_and(|nulls| nulls.null_count() == keys.len());
-        if !within && !all_null() {
-            return Err(Unsupported);
         }
-        Ok(Arc::new(Int64Array::try_new(values, nulls).map_err(|_| Unsupported)?))
+        take(&self.0, &keys, Some(TakeOptions { check_bounds: true })).map_err(|_| Unsupported)
     }
 }

@@ -2,8 +2,6 @@
 //!
 //! Source: the Parquet format's "Run Length Encoding / Bit-Packing Hybrid (RLE = 3)".
 
-use std::convert::Infallible;
-
 use bytes::Bytes;
 
 use crate::bits::word;
@@ -66,27 +64,31 @@ impl Hybrid {
         })
     }
 
+    /// Takes the next `count` numbers span by span.
+    #[inline]
+    pub(crate) fn each_span(&mut self, mut count: usize, mut take: impl FnMut(Span<'_>)) -> Result<(), Unsupported> {
+        while count > 0 {
+            let span = self.span(count)?;
+            count -= span.count();
+            take(span);
+        }
+        Ok(())
+    }
+
     pub(crate) fn append<N: Number>(&mut self, count: usize, out: &mut Vec<N>) -> Result<(), Unsupported> {
         if self.width > N::WIDTH {
             return Err(Unsupported);
         }
-        let start = out.len();
-        out.resize(start + count, N::default());
-        let mut rest = &mut out[start..];
-        while !rest.is_empty() {
-            let taken = match self.span(rest.len())? {
-                Span::Same { value, count } => {
-                    rest[..count].fill(N::of(value));
-                    count
-                }
+        self.each_span(count, |span| {
+            let start = out.len();
+            match span {
+                Span::Same { value, count } => out.resize(start + count, N::of(value)),
                 Span::Packed(packed) => {
-                    packed.unpack(&mut rest[..packed.count]);
-                    packed.count
+                    out.resize(start + packed.count, N::default());
+                    packed.unpack(&mut out[start..]);
                 }
-            };
-            rest = &mut rest[taken..];
-        }
-        Ok(())
+            }
+        })
     }
 
     fn next_run(&mut self) -> Result<(), Unsupported> {
@@ -195,23 +197,17 @@ impl Number for i32 {
 
 impl Packed<'_> {
     pub(crate) fn each(&self, mut take: impl FnMut(u32)) {
-        let Ok(()) = self.blocks(|some| {
-            for number in some {
-                take(number.cast_unsigned());
-            }
-            Ok::<_, Infallible>(())
-        });
+        self.blocks(|some| some.iter().for_each(|number| take(number.cast_unsigned())));
     }
 
-    pub(crate) fn blocks<E>(&self, mut take: impl FnMut(&[i32]) -> Result<(), E>) -> Result<(), E> {
+    pub(crate) fn blocks(&self, mut take: impl FnMut(&[i32])) {
         let mut numbers = [0_i32; 64];
         for first in (0..self.count).step_by(numbers.len()) {
             let count = numbers.len().min(self.count - first);
             let some = &mut numbers[..count];
             Self { bit: self.bit + first * self.width, ..*self }.unpack(some);
-            take(some)?;
+            take(some);
         }
-        Ok(())
     }
 
     fn unpack<N: Number>(&self, out: &mut [N]) {

@@ -4,6 +4,7 @@ use std::io::Cursor;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use mirrorstats_exact::replace::folder_of;
 use mirrorstats_log::assemble;
 use mirrorstats_log::recover::{Recovered, recover_from};
 use mirrorstats_trace::diagnostic::Severity;
@@ -54,7 +55,8 @@ pub fn assembled(data: &[u8]) {
     let before = recovered(data);
     let lost_before = before.as_ref().is_some_and(|found| found.losses.is_any());
     let place = before.and_then(|found| found.episodes.first().map(assemble::place)).unwrap_or_default();
-    if assemble::write(&out, &[(place, part)], &json!({ "kind": "recording" })).is_err() {
+    let recording = json!({ "kind": "recording" });
+    if assemble::assemble(&out, None, &[(place, part)], &recording, folder_of(&out)).is_err() {
         assert!(!out.exists(), "a refused log leaves a file");
         return;
     }

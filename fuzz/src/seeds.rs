@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use mirrorstats_analysis::plan::register::{NamedHash, RegisteredPlan};
 use mirrorstats_analysis::plan::{Given, PlanRequest, plan};
+use mirrorstats_exact::replace::folder_of;
 use mirrorstats_log::message::Decision;
 use mirrorstats_log::write::EpisodeLog;
 use mirrorstats_log::{assemble, topic};
@@ -158,7 +159,8 @@ fn logs() -> Vec<Vec<u8>> {
     let recording = json!({ "kind": "recording", "topic": topic::EPISODE, "columns": ["reasoning"] });
     for count in [1, 3] {
         let out = scratch::path("all.mcap");
-        assemble::write(&out, &parts[..count], &recording).expect("logs that were just written");
+        let made = assemble::assemble(&out, None, &parts[..count], &recording, folder_of(&out));
+        made.expect("logs that were just written");
         found.push(fs::read(out).unwrap_or_default());
     }
     let cut: Vec<Vec<u8>> = found.iter().map(|log| log[..log.len() * 2 / 3].to_vec()).collect();

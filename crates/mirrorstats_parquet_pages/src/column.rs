@@ -333,7 +333,7 @@ impl<'a> DictionaryTexts<'a> {
     }
 }
 
-fn narrow(row: usize) -> u32 {
+pub(crate) fn narrow(row: usize) -> u32 {
     u32::try_from(row)
         .expect("rows are decoded some thousands at a time, and an episode of 2^32 steps does not fit into memory")
 }

@@ -8,10 +8,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use mirrorstats_metric::catalogs::catalog::Catalog;
 use serde_json::Value;
 
-use crate::study::SCENE;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_score::tables::table::{Declared, EpisodeTable, LabelColumn};
 
+/// The label of the scene: room, body, cubes, start.
+pub(crate) const SCENE: &str = "scene";
+pub(crate) const PARTICIPANT: &str = "participant";
 pub const FINGERPRINT: &str = "fingerprint";
 /// The label of the origin of an episode, where a study has episodes of several origins.
 pub const ORIGIN: &str = "origin";

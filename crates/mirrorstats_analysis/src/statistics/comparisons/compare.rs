@@ -12,7 +12,7 @@ use crate::statistics::comparisons::retest::repeat_variance;
 use crate::statistics::rates::durations::{decided, is_duration};
 use crate::study::{Block, Study, Unit};
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_metric::catalogs::catalog::{Kind, Metric, StandardError};
+use mirrorstats_metric::catalogs::catalog::{Metric, StandardError};
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::comparisons::holm::{is_significant, level};
 use mirrorstats_statistics::comparisons::margin::Counts;
@@ -125,11 +125,7 @@ pub(crate) struct Compared<'s, 'a> {
 impl Compared<'_, '_> {
     /// The comparison under one metric, in its unit, before adjustment.
     pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
-        let found = self.stored(column);
-        match self.study.metric(&column.name) {
-            Some(metric) => found.in_unit(metric),
-            None => found,
-        }
+        self.stored(column).in_unit(self.study.metric(&column.name))
     }
 
     /// The comparison of the stored values.
@@ -176,7 +172,7 @@ impl Compared<'_, '_> {
     /// The comparison without the lost episodes of both sides, or with them. In a comparison by pairs or units, each
     /// lost episode is a pair against a known outcome, which is its largest possible effect.
     fn assuming(&self, lost: Option<Toward>, column: &MetricColumn, sides: Option<&Sides>) -> Comparison {
-        let rates = self.study.kind(&column.name) == Kind::Rate;
+        let rates = self.study.is_rate(&column.name);
         match sides {
             Some(sides) if rates => self.rates_by_unit(lost, column, sides),
             _ if !rates && self.is_dependent() => self.quantity_by_unit(lost, column),
@@ -216,7 +212,7 @@ impl Compared<'_, '_> {
             unit_means,
             pairs: pairs.map(|rows| outcomes(column, rows)),
             p: test.map(|test| test.p),
-            units: Some(Units::between(self.study, [self.first, self.second], sides, least, self.confidence)),
+            units: Some(Units::between(self.study, [self.first, self.second], sides, least)),
             counts,
             ..Comparison::of(Method::Units, [a.n, b.n])
         };
@@ -259,7 +255,7 @@ impl Compared<'_, '_> {
         let n = if is_paired { sides.shared.len() } else { sides.first.len().min(sides.second.len()) };
         let found = by_units(&sides, horizon, self.confidence);
         let least = if (n as u64) < fewest_of(self.confidence) { 1.0 } else { 0.0 };
-        let units = Units::new(self.study, self.first, n, least, self.confidence);
+        let units = Units::new(self.study, self.first, n, least);
         let method = if is_paired { Method::RestrictedMeanPaired } else { Method::RestrictedMean };
         let tested = Comparison::of_durations(method, [n as u64; 2], found, self.confidence);
         Comparison { n: seen.n, units: Some(units), unit_means: first.zip(second).map(<[f64; 2]>::from), ..tested }
@@ -281,7 +277,7 @@ impl Compared<'_, '_> {
         if is_duration(self.study, &column.name) {
             return self.durations(lost, column);
         }
-        let rates = self.study.kind(&column.name) == Kind::Rate;
+        let rates = self.study.is_rate(&column.name);
         match &self.matched.pairs {
             Some(pairs) if rates => self.paired_rate(lost, column, pairs),
             Some(pairs) => self.paired_quantity(column, pairs),
@@ -385,7 +381,7 @@ pub(crate) fn selection(study: &Study, column: &MetricColumn, sides: [&Block; 2]
     let counts = sides.map(|block| (block.moments(column).n, block.rows().count() as u64));
     // A side without any value is not compared at all.
     let is_part = counts.iter().any(|(defined, all)| defined < all) && counts.iter().all(|(defined, _)| *defined > 0);
-    let is_conditional = study.metric(&column.name).is_some_and(|metric| metric.when.is_some());
+    let is_conditional = study.metric(&column.name).when.is_some();
     let [(a, m), (b, n)] = counts;
     (is_conditional && is_part).then(|| format!("defined in {a} of {m} against {b} of {n} episodes"))
 }

@@ -35,8 +35,8 @@ pub struct LossRow {
 }
 
 impl Losses {
-    pub(crate) fn of(study: &Study, recorded: bool, confidence: f64) -> Self {
-        let rows = study.blocks().flat_map(|block| of_block(study, block, confidence)).collect();
+    pub(crate) fn of(study: &Study, recorded: bool) -> Self {
+        let rows = study.blocks().flat_map(|block| of_block(study, block)).collect();
         Self { recorded, rows }
     }
 }
@@ -145,10 +145,10 @@ pub(crate) fn settle<'c>(
     tests.into_iter().enumerate().map(settled).collect()
 }
 
-fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {
+fn of_block(study: &Study, block: &Block) -> Vec<LossRow> {
     let of_rate = |column: &MetricColumn| {
         let values = block.rows().filter_map(|row| column.get(row));
-        let lossy = bounds(values, block.lost, confidence)?;
+        let lossy = bounds(values, block.lost, study.confidence)?;
         Some(LossRow { key: block.key(), metric: column.name.clone(), lossy })
     };
     if block.lost > 0 { study.rates().filter_map(of_rate).collect() } else { Vec::new() }

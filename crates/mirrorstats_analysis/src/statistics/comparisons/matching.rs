@@ -102,15 +102,15 @@ pub struct Units {
 }
 
 impl Units {
-    pub(crate) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
-        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, confidence) }
+    pub(crate) fn new(study: &Study, block: &Block, n: usize, least: f64) -> Self {
+        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, study.confidence) }
     }
 
     /// The units of two sides. Units of different kinds, such as participants and scenes, cannot be tested.
-    pub(super) fn between(study: &Study, blocks: [&Block; 2], sides: &Sides, least: f64, confidence: f64) -> Self {
+    pub(super) fn between(study: &Study, blocks: [&Block; 2], sides: &Sides, least: f64) -> Self {
         let ([first, second], names) = (sides.counts(), blocks.map(|block| study.unit_name(block)));
         if names[0] == names[1] {
-            return Self::new(study, blocks[0], first.min(second), least, confidence);
+            return Self::new(study, blocks[0], first.min(second), least);
         }
         let second = counted(second as u64, singular(names[1]));
         Self { n: first as u64, name: format!("{} against {second}", names[0]), too_few: true }

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{ALL, DesignCheck, DesignFinding, OF_MODELS, Touched};
-use crate::comparable::{BODY_COLOR, Budget, ORIGIN, REPETITION};
+use crate::comparable::{BODY_COLOR, Budget, ORIGIN, PARTICIPANT, REPETITION, SCENE};
 use crate::statistics::comparisons::matching::singular;
 use crate::statistics::rates::durations::{decided, is_duration};
 use crate::statistics::{FEW, Replies};
-use crate::study::{Block, PARTICIPANT, RowKey, SCENE, Study};
+use crate::study::{Block, RowKey, Study};
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_score::tables::lost_counts::LostCounts;
@@ -199,7 +199,9 @@ impl Audit<'_, '_> {
                 format!("{about}: scenes are repeated unequally (repetitions {named}, not the same in each scene)");
             self.find(DesignCheck::Repetitions, &OF_MODELS, finding);
         }
-        let Some(rate) = study.rates().find(|column| study.better(&column.name) == Better::Higher) else { return };
+        let Some(rate) = study.rates().find(|column| study.metric(&column.name).better == Better::Higher) else {
+            return;
+        };
         let values = |rows: &Vec<usize>| -> Vec<i64> {
             let mut rows = rows.clone();
             let repetition = |row: usize| column.and_then(|column| column.get(row)?.parse::<i64>().ok());

@@ -213,13 +213,5 @@ impl TableCell {
     }
 }
 
-impl Emphasis {
-    /// The word for it in CSV files; empty for no emphasis.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Plain => "",
-            Self::Bold => "bold",
-            Self::Underline => "underline",
-        }
-    }
-}
+// The words of CSV files.
+mirrorstats_exact::names!(Emphasis { Plain: "", Bold: "bold", Underline: "underline" });

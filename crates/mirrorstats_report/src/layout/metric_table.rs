@@ -254,7 +254,7 @@ impl MetricCell {
 
     fn fields(&self, form: CellForm) -> Vec<String> {
         let text = |number: Option<Decimal>| number.map(|number| number.to_string()).unwrap_or_default();
-        let (mean, emphasis) = (text(self.value.mean()), self.emphasis.word().to_owned());
+        let (mean, emphasis) = (text(self.value.mean()), self.emphasis.name().to_owned());
         match form {
             CellForm::MeanSe => vec![mean, text(self.value.se()), emphasis],
             CellForm::CountInterval => {

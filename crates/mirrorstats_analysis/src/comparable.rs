@@ -114,8 +114,7 @@ fn between(declared: &Declared, names: [&str; 2], varied: Varied) -> Option<Stri
         let worlds = || is_hashed.then(|| parts(declared, names, &["world"])).flatten();
         return found.or_else(worlds).or_else(|| between_experiments(one, other));
     }
-    let parts = found;
-    parts.map(|parts| match settings(one, other, varied) {
+    found.map(|parts| match settings(one, other, varied) {
         Some(settings) if varied == Varied::Nothing => format!("{parts}; {settings}"),
         Some(settings) => settings,
         None => parts,

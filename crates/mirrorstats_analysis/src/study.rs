@@ -44,7 +44,7 @@ pub(crate) struct Study<'a> {
 }
 
 /// The experiment, the model and the condition that a row is about.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct RowKey {
     /// The experiment.
     pub experiment: String,
@@ -308,6 +308,11 @@ impl<'a> Block<'a> {
 
 pub(crate) fn named(model: &str, condition: Option<&str>) -> String {
     condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
+}
+
+/// Every two of some items, in their order.
+pub(crate) fn couples<T>(items: &[T]) -> impl Iterator<Item = (&T, &T)> {
+    items.iter().enumerate().flat_map(|(at, first)| items[at + 1..].iter().map(move |second| (first, second)))
 }
 
 /// The condition and the side of a block.

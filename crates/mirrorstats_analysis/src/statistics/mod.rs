@@ -48,6 +48,7 @@ pub use comparisons::models::{Family, Gap, PairTest, Reach};
 pub use comparisons::retest::RetestRow;
 pub use comparisons::trends::{Dose, TrendRow};
 pub use design_audit::{CellDesign, DesignAudit, DesignCheck, DesignFinding, Touched};
+pub(crate) use episodes::span;
 pub use episodes::{Replies, Selection, UnusableReplies};
 pub use options::Options;
 pub(crate) use rates::cells::FEW;

@@ -69,7 +69,7 @@ impl<'s, 'a> ConditionPair<'s, 'a> {
 }
 
 impl Contrast {
-    pub(crate) fn name(&self) -> String {
+    pub fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())
     }
 

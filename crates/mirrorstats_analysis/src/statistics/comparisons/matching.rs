@@ -133,7 +133,7 @@ pub(crate) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
 }
 
 pub(crate) struct Sides {
-    units: BTreeMap<Unit, (Moments, Moments)>,
+    units: BTreeMap<Unit, [Moments; 2]>,
 }
 
 impl Sides {
@@ -144,25 +144,18 @@ impl Sides {
             return None;
         }
         let sides = Self::by(study, strata, |row| column.get(row));
-        let repeats = sides.units.values().any(|(a, b)| a.n > 1 || b.n > 1);
-        let shared = sides.units.values().filter(|(a, b)| a.n > 0 && b.n > 0).count();
+        let repeats = sides.units.values().flatten().any(|side| side.n > 1);
+        let shared = sides.units.values().filter(|[a, b]| a.n > 0 && b.n > 0).count();
         let is_partly_shared = shared > 0 && shared < sides.units.len();
         (repeats || is_partly_shared).then_some(sides)
     }
 
     pub fn by(study: &Study, strata: &[(&Block, &Block)], value: impl Fn(usize) -> Option<i64>) -> Self {
-        let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
-        let add = |sum: &mut Moments, part: Moments| {
-            sum.n += part.n;
-            sum.sum += part.sum;
-            sum.sum_sq += part.sum_sq;
-        };
-        for (first, second) in strata {
-            for (unit, part) in study.by_unit(first, &value) {
-                add(&mut units.entry(unit).or_default().0, part);
-            }
-            for (unit, part) in study.by_unit(second, &value) {
-                add(&mut units.entry(unit).or_default().1, part);
+        let mut units: BTreeMap<Unit, [Moments; 2]> = BTreeMap::new();
+        for (side, block) in strata.iter().flat_map(|(first, second)| [(0, first), (1, second)]) {
+            for (row, value) in block.rows().filter_map(|row| Some((row, value(row)?))) {
+                let sum = &mut units.entry(study.unit(row)).or_default()[side];
+                *sum = sum.with(value).expect("a part of blocks that were summed whole");
             }
         }
         Self { units }
@@ -170,10 +163,11 @@ impl Sides {
 
     /// The means of both sides, with each unit counted once.
     pub fn means(&self) -> [Option<f64>; 2] {
-        let side = |of: fn(&(Moments, Moments)) -> Moments| -> Vec<Moments> {
-            self.units.values().map(of).filter(|side| side.n > 0).collect()
-        };
-        [units::mean(&side(|unit| unit.0)), units::mean(&side(|unit| unit.1))]
+        [0, 1].map(|side| units::mean(&self.of_side(side).collect::<Vec<_>>()))
+    }
+
+    fn of_side(&self, side: usize) -> impl Iterator<Item = Moments> {
+        self.units.values().map(move |unit| unit[side]).filter(|moments| moments.n > 0)
     }
 
     /// The units on the smaller side.
@@ -182,17 +176,14 @@ impl Sides {
     }
 
     fn counts(&self) -> [usize; 2] {
-        let has = |[first, second]: [usize; 2], (a, b): &(Moments, Moments)| {
-            [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]
-        };
-        self.units.values().fold([0, 0], has)
+        [0, 1].map(|side| self.of_side(side).count())
     }
 
     /// The shared units, and those of one side; `None` if the units of the two sides are of different kinds.
     pub(crate) fn divided(&self) -> Option<units::Sides> {
         let mut sides = units::Sides::default();
         let mut kinds = [None; 2];
-        for (unit, &(a, b)) in &self.units {
+        for (unit, &[a, b]) in &self.units {
             match (a.n, b.n) {
                 (0, _) => sides.second.push(b),
                 (_, 0) => sides.first.push(a),

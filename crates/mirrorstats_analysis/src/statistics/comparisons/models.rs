@@ -10,7 +10,7 @@ use crate::statistics::comparisons::compare::{Compared, Comparison, Method};
 use crate::statistics::comparisons::family::adjust;
 use crate::statistics::comparisons::matching::{Matched, Matching, Scenes};
 use crate::statistics::rates::durations::{self, is_duration};
-use crate::study::{Block, Experiment, RowKey, Study};
+use crate::study::{Block, Experiment, RowKey, Study, couples};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::comparisons::holm::level;
@@ -173,10 +173,7 @@ impl Family {
     fn of(experiment: &str, field: &MatchedBlocks, asked: Asked) -> Self {
         let (study, column) = (field.study, asked.column);
         let order = best_first(field, asked);
-        let mut tests = Vec::new();
-        for (at, &first) in order.iter().enumerate() {
-            tests.extend(order[at + 1..].iter().map(|&second| field.better_first(asked, (first, second))));
-        }
+        let mut tests: Vec<_> = couples(&order).map(|(a, b)| field.better_first(asked, (*a, *b))).collect();
         let family = tests.iter_mut().map(|(test, pair)| {
             let again = |confidence| field.test(asked, *pair, confidence).comparison;
             (&mut test.comparison, again)

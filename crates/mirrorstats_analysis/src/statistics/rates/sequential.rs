@@ -15,7 +15,7 @@ use crate::statistics::design_audit::{DesignAudit, Touched};
 use crate::statistics::episodes::Selection;
 use crate::statistics::options::Options;
 use crate::statistics::rates::chance::{Level, Role, Verdict, levels};
-use crate::study::{Block, Experiment, RowKey, Study, Unit};
+use crate::study::{Block, Experiment, RowKey, Study, Unit, couples};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
@@ -170,10 +170,9 @@ impl Sequential {
 
 fn not_comparable(study: &Study) -> BTreeMap<String, usize> {
     let mut found = BTreeMap::new();
-    for experiment in &study.experiments {
-        for (at, first) in experiment.blocks.iter().enumerate() {
-            let settings = experiment.blocks[at + 1..].iter().filter_map(|second| study.incomparable(first, second));
-            settings.for_each(|setting| *found.entry(setting).or_default() += 1);
+    for (first, second) in study.experiments.iter().flat_map(|experiment| couples(&experiment.blocks)) {
+        if let Some(setting) = study.incomparable(first, second) {
+            *found.entry(setting).or_default() += 1;
         }
     }
     found
@@ -264,13 +263,11 @@ impl SequentialPair {
         blocks.sort_by(|a, b| by_mean(mean(a), mean(b), study.metric(&column.name).better));
         let firsts: Vec<_> = blocks.iter().map(|block| (*block, study.firsts(block, column))).collect();
         let mut tested = Vec::new();
-        for (at, (first, here)) in firsts.iter().enumerate() {
-            for (second, there) in &firsts[at + 1..] {
-                let is_selected = selection(study, column, [first, second]).is_some();
-                if !is_selected && study.incomparable(first, second).is_none() {
-                    let (pairs, shared) = matched(here, there);
-                    tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
-                }
+        for ((first, here), (second, there)) in couples(&firsts) {
+            let is_selected = selection(study, column, [first, second]).is_some();
+            if !is_selected && study.incomparable(first, second).is_none() {
+                let (pairs, shared) = matched(here, there);
+                tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
             }
         }
         let adjusted = holm(&tested.iter().map(|(.., found)| found.p).collect::<Vec<_>>());

@@ -39,9 +39,8 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
 pub use apart::SettingApart;
-pub use comparisons::compare::{Comparison, Method, Sign};
+pub use comparisons::compare::{Comparison, Equivalence, Method, Sign};
 pub use comparisons::conditions::Contrast;
-pub use comparisons::family::Equivalence;
 pub use comparisons::losses::{LossCase, LossCases, LossRow, Losses};
 pub use comparisons::matching::{Matching, Units};
 pub use comparisons::models::{Family, Gap, PairTest, Reach};

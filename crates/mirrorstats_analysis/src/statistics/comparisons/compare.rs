@@ -5,9 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::family::Equivalence;
 use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward};
-use crate::statistics::comparisons::matching::{Matched, Sides, Units, outcomes};
+use crate::statistics::comparisons::matching::{Matched, Sides, Units, outcomes, selection};
 use crate::statistics::comparisons::retest::repeat_variance;
 use crate::statistics::rates::durations::{decided, is_duration};
 use crate::study::{Block, Study, Unit};
@@ -47,6 +46,17 @@ pub enum Method {
     /// Rates of scenes, seeds or participants with several episodes, or of which some are pairs: the exact permutation
     /// test within shared units and among the others; no interval.
     Units,
+}
+
+/// The test of a difference smaller than a margin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Equivalence {
+    /// The margin, in the unit of the metric.
+    pub margin: f64,
+    /// The p value of a difference of the margin or more in either direction, adjusted by Holm's method over the family.
+    pub p_adjusted: f64,
+    /// True if the difference is shown to be smaller than the margin.
+    pub is_shown: bool,
 }
 
 /// The first minus the second.
@@ -372,18 +382,6 @@ impl Compared<'_, '_> {
         let pairs: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
         paired(&pairs, horizon, self.confidence)
     }
-}
-
-/// The selection of two sides by the condition of a metric, such as success; `None` if the metric is defined in all their
-/// episodes or in none of a side. What selects episodes may be what the sides differ in, so that a difference among the selected ones is no
-/// difference of the sides (Frangakis and Rubin 2002, principal stratification).
-pub(crate) fn selection(study: &Study, column: &MetricColumn, sides: [&Block; 2]) -> Option<String> {
-    let counts = sides.map(|block| (block.moments(column).n, block.rows().count() as u64));
-    // A side without any value is not compared at all.
-    let is_part = counts.iter().any(|(defined, all)| defined < all) && counts.iter().all(|(defined, _)| *defined > 0);
-    let is_conditional = study.metric(&column.name).when.is_some();
-    let [(a, m), (b, n)] = counts;
-    (is_conditional && is_part).then(|| format!("defined in {a} of {m} against {b} of {n} episodes"))
 }
 
 impl Comparison {

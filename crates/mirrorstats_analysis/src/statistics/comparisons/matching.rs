@@ -90,6 +90,18 @@ impl Matched {
     }
 }
 
+/// The selection of two sides by the condition of a metric, such as success; `None` if the metric is defined in all their
+/// episodes or in none of a side. What selects episodes may be what the sides differ in. A difference among the selected
+/// ones is then no difference of the sides (Frangakis and Rubin 2002, principal stratification).
+pub(crate) fn selection(study: &Study, column: &MetricColumn, sides: [&Block; 2]) -> Option<String> {
+    let counts = sides.map(|block| (block.moments(column).n, block.rows().count() as u64));
+    // A side without any value is not compared at all.
+    let is_part = counts.iter().any(|(defined, all)| defined < all) && counts.iter().all(|(defined, _)| *defined > 0);
+    let is_conditional = study.metric(&column.name).when.is_some();
+    let [(a, m), (b, n)] = counts;
+    (is_conditional && is_part).then(|| format!("defined in {a} of {m} against {b} of {n} episodes"))
+}
+
 /// Scenes, seeds or participants with several episodes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Units {

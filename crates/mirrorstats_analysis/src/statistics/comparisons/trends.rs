@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::compare::selection;
+use crate::statistics::comparisons::matching::selection;
 use crate::statistics::rates::chance::Verdict;
 use crate::study::{Block, Study, Unit};
 use mirrorstats_metric::catalogs::catalog::Factor;

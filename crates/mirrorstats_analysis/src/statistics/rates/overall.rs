@@ -8,9 +8,8 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::compare::selection;
 use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::comparisons::matching::{Matched, Scenes, Sides, outcomes};
+use crate::statistics::comparisons::matching::{Matched, Scenes, Sides, outcomes, selection};
 use crate::statistics::comparisons::models::{Family, PairTest};
 use crate::statistics::rates::durations::{decided, is_duration};
 use crate::study::{Block, Study};

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::compare::selection;
+use crate::statistics::comparisons::matching::selection;
 use crate::statistics::comparisons::models::by_mean;
 use crate::statistics::conclusions::headline;
 use crate::statistics::design_audit::{DesignAudit, Touched};

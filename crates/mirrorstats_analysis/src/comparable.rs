@@ -8,10 +8,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use mirrorstats_metric::catalogs::catalog::Catalog;
 use serde_json::Value;
 
-use crate::study::SCENE;
 use mirrorstats_exact::escape::visible;
 use mirrorstats_score::tables::table::{Declared, EpisodeTable, LabelColumn};
 
+/// The label of the scene: room, body, cubes, start.
+pub(crate) const SCENE: &str = "scene";
+pub(crate) const PARTICIPANT: &str = "participant";
 pub const FINGERPRINT: &str = "fingerprint";
 /// The label of the origin of an episode, where a study has episodes of several origins.
 pub const ORIGIN: &str = "origin";
@@ -112,8 +114,7 @@ fn between(declared: &Declared, names: [&str; 2], varied: Varied) -> Option<Stri
         let worlds = || is_hashed.then(|| parts(declared, names, &["world"])).flatten();
         return found.or_else(worlds).or_else(|| between_experiments(one, other));
     }
-    let parts = found;
-    parts.map(|parts| match settings(one, other, varied) {
+    found.map(|parts| match settings(one, other, varied) {
         Some(settings) if varied == Varied::Nothing => format!("{parts}; {settings}"),
         Some(settings) => settings,
         None => parts,

@@ -6,23 +6,18 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::comparable::{Budget, Recorded, Varied, difference, driver};
+use crate::comparable::{Budget, PARTICIPANT, Recorded, SCENE, Varied, difference, driver};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_metric::catalogs::catalog::{Better, Kind, Metric};
 use mirrorstats_metric::catalogs::relations::Relations;
-use mirrorstats_score::cells::interval;
+use mirrorstats_score::cells::interval::{self, CONFIDENCE};
 use mirrorstats_score::tables::lost_counts::LostCounts;
-use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
+use mirrorstats_score::tables::table::{CONDITION, EpisodeTable, KeyRef, MetricColumn, TextColumn};
 use mirrorstats_statistics::comparisons::units::mean;
 use mirrorstats_statistics::design::{Cluster, Design};
 use mirrorstats_statistics::intervals::interval::Interval;
 
 const DEFAULT_CONDITION: &str = "default";
-
-/// The label of the scene: room, body, cubes, start.
-pub(crate) const SCENE: &str = "scene";
-
-pub(crate) const PARTICIPANT: &str = "participant";
 
 /// The unit of analysis: episodes within it depend on each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,6 +34,8 @@ pub(crate) struct Study<'a> {
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
     pub relations: Relations,
+    /// The confidence of every interval, and one minus the level of every test.
+    pub confidence: f64,
     /// True to ignore differing settings.
     pub pool: bool,
     /// The margin of equivalence: of rates below 1, of durations from 1 on.
@@ -47,7 +44,7 @@ pub(crate) struct Study<'a> {
 }
 
 /// The experiment, the model and the condition that a row is about.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct RowKey {
     /// The experiment.
     pub experiment: String,
@@ -94,31 +91,40 @@ impl<'a> Study<'a> {
         lost: Option<&LostCounts>,
         sides: Option<&'a TextColumn>,
     ) -> Result<Self, MomentOverflow> {
+        let ranges = table.metrics.iter().map(|column| column.name.as_str()).zip(interval::ranges(table)).collect();
+        let relations = Relations::of(&table.catalog);
+        let (experiments, confidence, pool, margin) = (Vec::new(), CONFIDENCE, false, None);
+        let mut study = Self { table, design, experiments, relations, confidence, pool, margin, ranges };
         let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
         let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
         // A table is ordered by experiment, then by model.
         for rows in runs(0..table.len(), |row| (table.keys.experiment.code(row), table.keys.model.code(row))) {
-            let key = table.keys.get(rows.start);
-            let of_experiment =
-                blocks.entry((table.catalog.experiment_rank(key.experiment), key.experiment)).or_default();
+            let KeyRef { experiment, model, .. } = table.keys.get(rows.start);
+            let of_experiment = blocks.entry((table.catalog.experiment_rank(experiment), experiment)).or_default();
             for ((condition, side), rows) in parts(conditions, sides, rows) {
-                let block = Block::of(table, (key.experiment, key.model, condition), rows)?;
-                of_experiment.push(Block { side, ..block });
+                let lost = lost.map_or(0, |lost| lost.of(experiment, model, condition));
+                of_experiment.push(study.block((experiment, model, condition), side, rows, lost)?);
             }
         }
-        let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
-        let names = table.metrics.iter().map(|column| column.name.as_str());
-        let ranges = names.zip(interval::ranges(table)).collect();
-        let relations = Relations::of(&table.catalog);
-        let mut study = Self { table, design, experiments, relations, pool: false, margin: None, ranges };
-        let of_block = |block: &Block| {
-            let lost = lost.map_or(0, |lost| lost.of(block.experiment, block.model, block.condition));
-            (lost, study.has_repeats(block.rows()))
-        };
-        let found: Vec<(u64, bool)> = study.blocks().map(of_block).collect();
-        let blocks = study.experiments.iter_mut().flat_map(|experiment| &mut experiment.blocks);
-        blocks.zip(found).for_each(|(block, (lost, repeats))| (block.lost, block.repeats) = (lost, repeats));
+        study.experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
         Ok(study)
+    }
+
+    fn block(
+        &self,
+        (experiment, model, condition): (&'a str, &'a str, Option<&'a str>),
+        side: Option<&'a str>,
+        rows: Vec<Range<usize>>,
+        lost: u64,
+    ) -> Result<Block<'a>, MomentOverflow> {
+        let of_column = |column: &'a MetricColumn| {
+            let moments = rows.iter().try_fold(Moments::default(), |sum, rows| column.add_moments(sum, rows.clone()));
+            Ok((column.name.as_str(), moments?))
+        };
+        let moments = self.table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
+        let recorded = Recorded::of(self.table, rows.iter().cloned().flatten());
+        let repeats = self.has_repeats(rows.iter().cloned().flatten());
+        Ok(Block { experiment, model, condition, side, rows, recorded, moments, lost, repeats })
     }
 
     /// The differing setting of two blocks that the comparison does not vary; `None` if none is known.
@@ -243,25 +249,27 @@ impl<'a> Study<'a> {
     }
 
     pub fn rates(&self) -> impl Iterator<Item = &'a MetricColumn> {
-        self.table.metrics.iter().filter(|column| self.kind(&column.name) == Kind::Rate)
+        self.table.metrics.iter().filter(|column| self.is_rate(&column.name))
     }
 
-    /// The kind of a metric; a metric that the catalog does not describe is not a rate.
-    pub fn kind(&self, metric: &str) -> Kind {
-        self.metric(metric).map_or(Kind::Quantity, |metric| metric.kind)
+    /// The definition of a metric of the table.
+    pub fn metric(&self, name: &str) -> &'a Metric {
+        &self.table.catalog.metric[name]
     }
 
-    pub fn metric(&self, name: &str) -> Option<&'a Metric> {
-        self.table.catalog.metric.get(name)
+    pub fn is_rate(&self, metric: &str) -> bool {
+        self.metric(metric).kind == Kind::Rate
     }
 
-    pub fn better(&self, metric: &str) -> Better {
-        self.metric(metric).map_or(Better::Neither, |metric| metric.better)
+    /// Returns true if a difference under a metric favours the second side.
+    pub fn is_worse(&self, metric: &str, difference: Option<f64>) -> bool {
+        let is_lower = self.metric(metric).better == Better::Lower;
+        difference.is_some_and(|difference| if is_lower { difference > 0.0 } else { difference < 0.0 })
     }
 
     /// The margin of equivalence under a metric; `None` if it is in the unit of others.
     pub(crate) fn margin_of(&self, column: &MetricColumn) -> Option<f64> {
-        self.margin.filter(|margin| (self.kind(&column.name) == Kind::Rate) == (*margin < 1.0))
+        self.margin.filter(|margin| self.is_rate(&column.name) == (*margin < 1.0))
     }
 
     /// The least and the largest possible mean of a metric.
@@ -271,21 +279,6 @@ impl<'a> Study<'a> {
 }
 
 impl<'a> Block<'a> {
-    fn of(
-        table: &'a EpisodeTable,
-        (experiment, model, condition): (&'a str, &'a str, Option<&'a str>),
-        rows: Vec<Range<usize>>,
-    ) -> Result<Self, MomentOverflow> {
-        let of_column = |column: &'a MetricColumn| {
-            let moments =
-                rows.iter().try_fold(Moments::default(), |sum, rows| column.add_moments(sum, rows.clone()))?;
-            Ok((column.name.as_str(), moments))
-        };
-        let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
-        let recorded = Recorded::of(table, rows.iter().cloned().flatten());
-        Ok(Self { experiment, model, condition, side: None, rows, recorded, moments, lost: 0, repeats: false })
-    }
-
     /// The name in comparisons: `model`, or `model [condition]` if there are several.
     pub fn name(&self) -> String {
         named(self.model, self.condition)
@@ -315,6 +308,11 @@ impl<'a> Block<'a> {
 
 pub(crate) fn named(model: &str, condition: Option<&str>) -> String {
     condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
+}
+
+/// Every two of some items, in their order.
+pub(crate) fn couples<T>(items: &[T]) -> impl Iterator<Item = (&T, &T)> {
+    items.iter().enumerate().flat_map(|(at, first)| items[at + 1..].iter().map(move |second| (first, second)))
 }
 
 /// The condition and the side of a block.

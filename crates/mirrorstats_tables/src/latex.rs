@@ -67,9 +67,7 @@ impl Table {
         let command = if text.contains("\\mirrorstatstext{") { UNICODE } else { "" };
         format!("{PACKAGES}{shades}\n{command}{text}")
     }
-}
 
-impl Table {
     /// The characters of a line, with two between columns.
     fn width(&self) -> usize {
         let cell = |cell: &TableCell| {

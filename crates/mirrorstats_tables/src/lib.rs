@@ -198,11 +198,11 @@ impl<T: Into<String>> From<T> for TableCell {
 
 impl TableCell {
     fn marked_up(&self, escape: fn(&str) -> String, bold: [&str; 2], underline: [&str; 2]) -> String {
-        let mark = self.mark();
+        let (text, mark) = (escape(&self.text), if self.is_marked { "†" } else { "" });
         let (inside, after) = match &self.detail {
-            Some(detail) if self.is_whole => (format!("{} {detail}", self.text), mark.to_owned()),
-            Some(detail) => (self.text.clone(), format!("{mark} {detail}")),
-            None => (escape(&self.text), mark.to_owned()),
+            Some(detail) if self.is_whole => (format!("{text} {detail}"), mark.to_owned()),
+            Some(detail) => (text, format!("{mark} {detail}")),
+            None => (text, mark.to_owned()),
         };
         let [before, behind] = match self.emphasis {
             Emphasis::Plain => ["", ""],
@@ -211,19 +211,7 @@ impl TableCell {
         };
         format!("{before}{inside}{behind}{after}")
     }
-
-    fn mark(&self) -> &'static str {
-        if self.is_marked { "†" } else { "" }
-    }
 }
 
-impl Emphasis {
-    /// The word for it in CSV files; empty for no emphasis.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Plain => "",
-            Self::Bold => "bold",
-            Self::Underline => "underline",
-        }
-    }
-}
+// The words of CSV files.
+mirrorstats_exact::names!(Emphasis { Plain: "", Bold: "bold", Underline: "underline" });

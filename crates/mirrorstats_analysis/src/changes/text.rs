@@ -82,7 +82,7 @@ fn rewritten(all: &[Rewritten], limit: usize, width: Option<usize>) -> Option<St
         [visible(&one.name), one.part.to_owned(), written(&one.text.before), written(&one.text.after)].to_vec()
     });
     let header = ["name", "part", "before", "after"].map(str::to_owned).to_vec();
-    List { header, names: 2, rows, count: all.len() }.render(limit, width)
+    list(header, 2, rows, limit, width)
 }
 
 fn moved_cells(changes: &Changes, limit: usize, width: Option<usize>) -> Option<String> {
@@ -93,7 +93,7 @@ fn moved_cells(changes: &Changes, limit: usize, width: Option<usize>) -> Option<
             [visible(&cell.metric), n(&cell.numbers), mean(&cell.numbers), mean_change(cell), se(&cell.numbers)];
         cell.key.values().map(key).chain(fields).collect()
     });
-    List { header, names: changes.by.len() + 1, rows, count: changes.cells.len() }.render(limit, width)
+    list(header, changes.by.len() + 1, rows, limit, width)
 }
 
 fn flips_by_metric(flips: &[Flip]) -> Option<String> {
@@ -135,28 +135,26 @@ fn flips(flips: &[Flip], limit: usize, width: Option<usize>) -> Option<String> {
         }
         row
     });
-    List { header, names: 4, rows, count: flips.len() }.render(limit, width)
+    list(header, 4, rows, limit, width)
 }
 
-struct List<R> {
+/// The first rows of a list, and how many more there are; `None` without any.
+fn list(
     header: Vec<String>,
     names: usize,
-    rows: R,
-    count: usize,
-}
-
-impl<R: Iterator<Item = Vec<String>>> List<R> {
-    fn render(self, limit: usize, width: Option<usize>) -> Option<String> {
-        let rest = left_out(self.count, limit);
-        match (self.count, limit) {
-            (0, _) => return None,
-            (_, 0) => return rest.map(|rest| format!("  {rest}")),
-            _ => {}
-        }
-        let table = Table::list(Look::Ruled, self.names, self.header.into_iter().map(Column::left));
-        let table = table.with(self.rows.take(limit)).within(width);
-        Some(rest.map_or_else(|| table.trim_end_matches('\n').to_owned(), |rest| format!("{table}  {rest}")))
+    rows: impl ExactSizeIterator<Item = Vec<String>>,
+    limit: usize,
+    width: Option<usize>,
+) -> Option<String> {
+    let rest = left_out(rows.len(), limit);
+    match (rows.len(), limit) {
+        (0, _) => return None,
+        (_, 0) => return rest.map(|rest| format!("  {rest}")),
+        _ => {}
     }
+    let table = Table::list(Look::Ruled, names, header.into_iter().map(Column::left));
+    let table = table.with(rows.take(limit)).within(width);
+    Some(rest.map_or_else(|| table.trim_end_matches('\n').to_owned(), |rest| format!("{table}  {rest}")))
 }
 
 fn left_out(all: usize, limit: usize) -> Option<String> {

@@ -24,7 +24,7 @@ use crate::statistics::{DesignAudit, Options, Replies};
 use crate::study::{Block, Study};
 use mirrorstats_exact::format::{fixed, p_value};
 use mirrorstats_exact::moments::MomentOverflow;
-use mirrorstats_metric::catalogs::catalog::{Better, Kind};
+use mirrorstats_metric::catalogs::catalog::{Better, Kind, Metric};
 use mirrorstats_score::quality::CellKey;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
@@ -133,7 +133,17 @@ pub struct GateSide {
     pub lost: u64,
 }
 
-struct Tried {
+/// A study of both sides, and the question to it.
+struct Judge<'s, 'a> {
+    study: &'s Study<'a>,
+    column: &'s MetricColumn,
+    options: &'s GateOptions,
+    /// The number of cells that are compared.
+    tests: usize,
+}
+
+struct Tried<'s, 'a> {
+    blocks: [&'s Block<'a>; 2],
     comparison: Comparison,
     spread: Option<margin::Spread>,
     held: Option<f64>,
@@ -148,7 +158,7 @@ impl Gate {
         let sides = GateSides::of(base, new);
         let barrier = sides.barrier().filter(|_| !options.pool);
         let counted = joined(&sides, options, LossFill::Out);
-        let study = sides::study(&counted, design)?;
+        let study = sides::study(&counted, design, options.confidence)?;
         let mut cells = judged(&study, options, barrier.as_deref());
         let lost = [base, new].map(LostCounts::of_table);
         let all = sides.lost(&lost);
@@ -165,7 +175,7 @@ impl Gate {
                 .map(|(lost, model)| lost.of(experiment, model, Some(condition)));
             (cell.base.lost, cell.new.lost) = (earlier, later);
             for (name, side) in [("BASE", cell.base), ("NEW", cell.new)] {
-                if cell.verdict == GateVerdict::NotComparable && side.is_lost() {
+                if cell.verdict == GateVerdict::NotComparable && side.n == 0 && side.lost > 0 {
                     cell.verdict = GateVerdict::CannotSay;
                     cell.why = format!("all episodes of {name} were lost ({})", side.lost);
                 }
@@ -175,7 +185,7 @@ impl Gate {
         if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
             for fill in [LossFill::Against, LossFill::For] {
                 let filled = joined(&sides, options, fill);
-                let bound = judged(&sides::study(&filled, design)?, options, barrier.as_deref());
+                let bound = judged(&sides::study(&filled, design, options.confidence)?, options, barrier.as_deref());
                 let verdicts: BTreeMap<_, _> = bound.iter().map(|cell| (cell.key(), cell.verdict)).collect();
                 for cell in &mut cells {
                     cell.bounded_by(verdicts.get(&cell.key()).copied(), fill);
@@ -218,59 +228,133 @@ fn judged(study: &Study, options: &GateOptions, barrier: Option<&str>) -> Vec<Ga
     };
     let settings: Vec<Option<String>> = couples.iter().map(setting).collect();
     let tests = settings.iter().filter(|setting| setting.is_none()).count();
+    let judge = Judge { study, column, options, tests };
     let tried = couples.iter().zip(&settings).map(|(&[base, new], setting)| {
         let blocks = [base?, new?];
-        setting.is_none().then(|| (Tried::of(study, column, blocks, options, tests), blocks))
+        setting.is_none().then(|| judge.tried(blocks))
     });
-    let tried: Vec<Option<(Tried, [&Block; 2])>> = tried.collect();
-    let adjusted = |of: fn(&Tried) -> Option<f64>| {
-        holm(&tried.iter().flatten().filter_map(|(tried, _)| of(tried)).collect::<Vec<_>>()).into_iter()
-    };
+    let tried: Vec<Option<Tried>> = tried.collect();
+    let adjusted =
+        |of: fn(&Tried) -> Option<f64>| holm(&tried.iter().flatten().filter_map(of).collect::<Vec<_>>()).into_iter();
     let (mut apart, mut held) = (adjusted(|tried| tried.comparison.p), adjusted(|tried| tried.held));
     let cells = couples.iter().zip(settings).zip(&tried).map(|((couple, setting), tried)| {
-        let cell = GateCell::blank(study, column, *couple, setting);
-        let Some((tried, blocks)) = tried else { return cell };
-        let adjusted = (tried.comparison.p.and_then(|_| apart.next()), tried.held.and_then(|_| held.next()));
-        let cell = GateCell { flips: sides::flips(study, column, *blocks), ..cell };
-        cell.decided(tried, adjusted, tests, options, (study, *blocks))
+        let cell = judge.blank(*couple, setting);
+        let Some(tried) = tried else { return cell };
+        let adjusted = [tried.comparison.p.and_then(|_| apart.next()), tried.held.and_then(|_| held.next())];
+        judge.decided(cell, tried, adjusted)
     });
     cells.collect()
 }
 
-impl Tried {
-    fn of(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2], options: &GateOptions, tests: usize) -> Self {
-        let is_rate = study.kind(&column.name) == Kind::Rate;
+impl<'s, 'a> Judge<'s, 'a> {
+    fn metric(&self) -> &'a Metric {
+        self.study.metric(&self.column.name)
+    }
+
+    fn tried(&self, blocks: [&'s Block<'a>; 2]) -> Tried<'s, 'a> {
+        let ([base, new], study, options) = (blocks, self.study, self.options);
         let matched = Matched::of(&Scenes::of(study, new), &Scenes::of(study, base));
         let at = |confidence| {
-            Compared { study, first: new, second: base, matched: &matched, horizon: None, confidence }.under(column)
+            Compared { study, first: new, second: base, matched: &matched, horizon: None, confidence }
+                .under(self.column)
         };
-        let is_lower = study.better(&column.name) == Better::Lower;
-        if is_rate {
-            let comparison = at(options.confidence);
+        let is_lower = self.metric().better == Better::Lower;
+        let comparison = at(options.confidence);
+        if self.metric().kind == Kind::Rate {
             let gained = if is_lower { comparison.counts.swapped() } else { comparison.counts };
-            return Self { held: gained.non_inferior(options.margin), spread: gained.spread(), comparison };
+            return Tried { blocks, held: gained.non_inferior(options.margin), spread: gained.spread(), comparison };
         }
         // Verdicts on a quantity use its interval, at the Bonferroni level.
-        let share = (1.0 - options.confidence) / tests.max(1) as f64;
+        let share = (1.0 - options.confidence) / self.tests.max(1) as f64;
         let told_apart = at(1.0 - share);
         let within = told_apart.within(share, at);
         let bound = |interval: Interval| if is_lower { -interval.high } else { interval.low };
         let is_apart = told_apart.interval.is_some_and(|interval| interval.low > 0.0 || interval.high < 0.0);
         let is_within = within.is_some_and(|interval| bound(interval) > -options.margin);
-        let shown = |is_shown: bool| if is_shown { 0.0 } else { 1.0 };
-        let comparison = Comparison { p: Some(shown(is_apart)), ..at(options.confidence) };
+        let shown = |is_shown: bool| Some(if is_shown { 0.0 } else { 1.0 });
         let units = comparison.n[0].min(comparison.n[1]);
         let spread = comparison.difference.zip(comparison.interval).map(|(difference, interval)| {
             let gain = if is_lower { -difference } else { difference };
             margin::Spread::of_interval(gain, interval, options.confidence, units)
         });
-        Self { comparison, spread, held: Some(shown(is_within)) }
+        let comparison = Comparison { p: shown(is_apart), ..comparison };
+        Tried { blocks, comparison, spread, held: shown(is_within) }
     }
-}
 
-impl GateSide {
-    const fn is_lost(&self) -> bool {
-        self.n == 0 && self.lost > 0
+    fn blank(&self, [base, new]: [Option<&Block>; 2], setting: Option<String>) -> GateCell {
+        let (model, experiment) = new.or(base).map_or(("", ""), |block| (block.model, block.experiment));
+        let metric = self.metric();
+        let side = |block: Option<&Block>| {
+            let moments = block.map(|block| block.moments(self.column)).unwrap_or_default();
+            let successes = moments.counts().filter(|_| metric.kind == Kind::Rate).map(|counts| counts.0);
+            let unit_mean = block.filter(|block| block.repeats).and_then(|block| self.study.mean(block, self.column));
+            let unit_mean = unit_mean.map(|mean| metric.in_unit(mean));
+            GateSide { n: moments.n, successes, mean: metric.mean(&moments), unit_mean, lost: 0 }
+        };
+        GateCell {
+            experiment: experiment.to_owned(),
+            model: model.to_owned(),
+            condition: new.or(base).and_then(sides::condition),
+            why: setting.unwrap_or_default(),
+            base: side(base),
+            new: side(new),
+            ..GateCell::default()
+        }
+    }
+
+    fn decided(&self, cell: GateCell, tried: &Tried, [p_adjusted, p_held]: [Option<f64>; 2]) -> GateCell {
+        let GateOptions { margin, confidence, .. } = *self.options;
+        let study = self.study;
+        let Tried { blocks: [base, new], comparison, spread, .. } = tried;
+        let alpha = level(confidence).unwrap_or_default();
+        let sign = if self.metric().better == Better::Lower { -1.0 } else { 1.0 };
+        let gain = comparison.difference.map_or(0.0, |difference| sign * difference);
+        // Units that no outcome could make significant, as `stats` has it. Lost episodes bound the verdict afterwards.
+        let too_few = Comparison { losses: None, ..comparison.clone() }.unsaid(confidence);
+        let is_mixed = study.unit_name(base) != study.unit_name(new);
+        // Without any difference the exact test shows nothing at any number of units, but a margin may hold.
+        let is_held = !is_mixed && !comparison.is_few(confidence) && p_held.is_some_and(|p| p <= alpha);
+        let is_apart = too_few.is_none() && p_adjusted.is_some_and(|p| p <= alpha);
+        let verdict = match () {
+            () if comparison.selected.is_some() => GateVerdict::CannotSay,
+            () if is_apart && gain > 0.0 => GateVerdict::Improved,
+            () if is_held => GateVerdict::Held,
+            () if is_apart && gain < 0.0 => GateVerdict::Regressed,
+            () => GateVerdict::CannotSay,
+        };
+        let settled_by = (verdict == GateVerdict::CannotSay && !is_mixed && comparison.selected.is_none())
+            .then(|| (*spread)?.settling(margin, alpha / self.tests.max(1) as f64))
+            .flatten();
+        let is_rate = self.metric().kind == Kind::Rate;
+        let numbers = |p: Option<f64>| if is_rate { format!(", p {}", p_value(p)) } else { String::new() };
+        let name = study.unit_name(new);
+        let why = match (verdict, &comparison.selected, settled_by) {
+            (GateVerdict::Improved, ..) => format!("better by {}{}", fixed(Some(gain), 3), numbers(p_adjusted)),
+            (GateVerdict::Held, ..) => format!("not worse by {margin}{}", numbers(p_held)),
+            (GateVerdict::Regressed, ..) => format!("worse by {}{}", fixed(Some(-gain), 3), numbers(p_adjusted)),
+            (_, Some(selected), _) => format!("{selected}, which the outcome selects"),
+            _ if is_mixed => {
+                let counted = too_few.map_or_else(|| "units of two kinds".to_owned(), |units| units.counted());
+                format!("{counted}: no test compares them")
+            }
+            (.., Some(n)) => format!("about {n} {name} on each side would settle it"),
+            _ if comparison.interval.is_none() && !is_rate => {
+                "the values have no interval: too few, too alike, or several per scene".to_owned()
+            }
+            _ => format!("too few {name} for any verdict"),
+        };
+        GateCell {
+            verdict,
+            why,
+            difference: comparison.difference,
+            interval: comparison.interval,
+            p_adjusted: p_adjusted.filter(|_| is_rate),
+            p_held: p_held.filter(|_| is_rate),
+            units: comparison.units.clone(),
+            settled_by,
+            flips: sides::flips(study, self.column, tried.blocks),
+            ..cell
+        }
     }
 }
 
@@ -279,92 +363,6 @@ impl GateCell {
     fn lost(key: &CellKey) -> Self {
         let condition = Some(key.condition.clone()).filter(|text| text != sides::DEFAULT);
         Self { experiment: key.experiment.clone(), model: key.model.clone(), condition, ..Self::default() }
-    }
-
-    fn blank(study: &Study, column: &MetricColumn, [base, new]: [Option<&Block>; 2], setting: Option<String>) -> Self {
-        let (model, experiment) = new.or(base).map_or(("", ""), |block| (block.model, block.experiment));
-        let side = |block: Option<&Block>| {
-            let moments = block.map(|block| block.moments(column)).unwrap_or_default();
-            let successes = moments.counts().filter(|_| study.kind(&column.name) == Kind::Rate);
-            let unit_mean = block.filter(|block| block.repeats).and_then(|block| study.mean(block, column));
-            let successes = successes.map(|counts| counts.0);
-            let metric = study.metric(&column.name);
-            let unit_mean = unit_mean.zip(metric).map(|(mean, metric)| metric.in_unit(mean));
-            GateSide { n: moments.n, successes, mean: metric.and_then(|it| it.mean(&moments)), unit_mean, lost: 0 }
-        };
-        Self {
-            experiment: experiment.to_owned(),
-            model: model.to_owned(),
-            condition: new.or(base).and_then(sides::condition),
-            why: setting.unwrap_or_default(),
-            base: side(base),
-            new: side(new),
-            ..Self::default()
-        }
-    }
-
-    fn decided(
-        self,
-        tried: &Tried,
-        (p_adjusted, p_held): (Option<f64>, Option<f64>),
-        tests: usize,
-        options: &GateOptions,
-        (study, blocks): (&Study, [&Block; 2]),
-    ) -> Self {
-        let Comparison { difference, interval, units, .. } = tried.comparison.clone();
-        let alpha = level(options.confidence).unwrap_or_default();
-        let sign = if study.better(&options.metric) == Better::Lower { -1.0 } else { 1.0 };
-        let gain = difference.map_or(0.0, |difference| sign * difference);
-        // Units that no outcome could make significant, as `stats` has it. Lost episodes bound the verdict afterwards.
-        let too_few = Comparison { losses: None, ..tried.comparison.clone() }.unsaid(options.confidence);
-        let is_mixed = study.unit_name(blocks[0]) != study.unit_name(blocks[1]);
-        // Without any difference the exact test shows nothing at any number of units, but a margin may hold.
-        let is_few = tried.comparison.is_few(options.confidence);
-        let is_held = !is_mixed && !is_few && p_held.is_some_and(|p| p <= alpha);
-        let selected = tried.comparison.selected.as_deref();
-        let is_apart = too_few.is_none() && p_adjusted.is_some_and(|p| p <= alpha);
-        let is_rate = study.kind(&options.metric) == Kind::Rate;
-        let numbers = |p: Option<f64>| if is_rate { format!(", p {}", p_value(p)) } else { String::new() };
-        let (verdict, why) = if selected.is_some() {
-            (GateVerdict::CannotSay, String::new())
-        } else if is_apart && gain > 0.0 {
-            (GateVerdict::Improved, format!("better by {}{}", fixed(Some(gain), 3), numbers(p_adjusted)))
-        } else if is_held {
-            (GateVerdict::Held, format!("not worse by {}{}", options.margin, numbers(p_held)))
-        } else if is_apart && gain < 0.0 {
-            (GateVerdict::Regressed, format!("worse by {}{}", fixed(Some(-gain), 3), numbers(p_adjusted)))
-        } else {
-            (GateVerdict::CannotSay, String::new())
-        };
-        let settled_by = (verdict == GateVerdict::CannotSay && !is_mixed && selected.is_none())
-            .then(|| tried.spread?.settling(options.margin, alpha / tests.max(1) as f64))
-            .flatten();
-        let name = study.unit_name(blocks[1]);
-        let why = match (verdict, settled_by) {
-            _ if selected.is_some() => format!("{}, which the outcome selects", selected.unwrap_or_default()),
-            (GateVerdict::CannotSay, _) if is_mixed => {
-                let counted = too_few.map_or_else(|| "units of two kinds".to_owned(), |units| units.counted());
-                format!("{counted}: no test compares them")
-            }
-            (GateVerdict::CannotSay, Some(n)) => format!("about {n} {name} on each side would settle it"),
-            (GateVerdict::CannotSay, None) if tried.comparison.interval.is_none() && !is_rate => {
-                "the values have no interval: too few, too alike, or several per scene".to_owned()
-            }
-            (GateVerdict::CannotSay, None) => format!("too few {name} for any verdict"),
-            _ => why,
-        };
-        let shown = |p: Option<f64>| p.filter(|_| is_rate);
-        Self {
-            verdict,
-            why,
-            difference,
-            interval,
-            p_adjusted: shown(p_adjusted),
-            p_held: shown(p_held),
-            units,
-            settled_by,
-            ..self
-        }
     }
 
     fn key(&self) -> (&str, &str, &str) {

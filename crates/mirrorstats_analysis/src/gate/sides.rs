@@ -6,9 +6,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::GateOptions;
-use crate::comparable::{BODY_COLOR, FINGERPRINT, ORIGIN, REPETITION, divide_scenes_by_color};
+use crate::comparable::{BODY_COLOR, FINGERPRINT, ORIGIN, PARTICIPANT, REPETITION, SCENE, divide_scenes_by_color};
 use crate::statistics::comparisons::matching::Scenes;
-use crate::study::{Block, PARTICIPANT, SCENE, Study};
+use crate::study::{Block, Study};
 use mirrorstats_exact::moments::MomentOverflow;
 use mirrorstats_exact::number::Decimal;
 use mirrorstats_metric::catalogs::catalog::Better;
@@ -139,8 +139,10 @@ pub(super) fn joined(sides: &GateSides, options: &GateOptions, fill: LossFill) -
     joined
 }
 
-pub(super) fn study(joined: &EpisodeTable, design: Design) -> Result<Study<'_>, MomentOverflow> {
-    Study::from_table(joined, design, None, joined.label(SIDE))
+pub(super) fn study(joined: &EpisodeTable, design: Design, confidence: f64) -> Result<Study<'_>, MomentOverflow> {
+    let mut study = Study::from_table(joined, design, None, joined.label(SIDE))?;
+    study.confidence = confidence;
+    Ok(study)
 }
 
 pub(super) fn couples<'s, 'a>(blocks: &'s [Block<'a>]) -> Vec<[Option<&'s Block<'a>>; 2]> {

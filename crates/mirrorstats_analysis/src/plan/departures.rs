@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::TestName;
 use super::register::{NamedHash, RegisteredPlan};
-use crate::statistics::Options;
+use crate::statistics::{Options, span};
 use mirrorstats_score::tables::table::EpisodeTable;
 
 const BY_PAIRS: &str = "pairs of equal scenes";
@@ -29,14 +29,7 @@ pub enum Looks {
     Any,
 }
 
-impl Looks {
-    const fn name(self) -> &'static str {
-        match self {
-            Self::Once => "one",
-            Self::Any => "any number",
-        }
-    }
-}
+mirrorstats_exact::names!(Looks { Once: "one", Any: "any number" });
 
 pub fn departures(plan: &RegisteredPlan, table: &EpisodeTable, options: &Options, looks: Looks) -> Vec<String> {
     let request = &plan.plan.request;
@@ -136,8 +129,9 @@ impl<'a> PlannedBlocks<'a> {
         Self(blocks)
     }
 
-    fn each(&self, count: impl Fn(&PlannedBlock) -> usize) -> String {
-        range(self.0.values().map(&count))
+    fn each(&self, count: fn(&PlannedBlock) -> usize) -> String {
+        let counts = self.0.values().map(count);
+        span(counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0))
     }
 
     fn pairing(&self, by_seed: bool) -> &'static str {
@@ -149,12 +143,5 @@ impl<'a> PlannedBlocks<'a> {
             (false, true) => BY_PAIRS,
             (false, false) => "episodes that are not all pairs of equal scenes",
         }
-    }
-}
-
-fn range(counts: impl Iterator<Item = usize> + Clone) -> String {
-    match (counts.clone().min(), counts.max()) {
-        (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
-        (least, _) => least.unwrap_or(0).to_string(),
     }
 }

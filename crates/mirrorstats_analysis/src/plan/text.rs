@@ -36,7 +36,7 @@ fn record(test: &PlannedTest, cluster: &str) -> [String; 9] {
     let count = |count: Option<u64>| count.map_or_else(|| UNDEFINED.to_owned(), |count| count.to_string());
     let family = if test.family > 1 { format!(", Holm over {}", test.family) } else { String::new() };
     [
-        test.test.title().replace("seed", cluster),
+        test.test.name().replace("seed", cluster),
         format!("{}{family}", fixed(Some(test.level), 5)),
         fixed(test.difference, 3),
         count(test.episodes),
@@ -108,24 +108,23 @@ pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
     } else {
         "seeds: episodes of one seed are no more alike than others (--icc says how far they are)".to_owned()
     };
+    let simulated = format!("against chance exact; of pairs from {STUDIES} simulated studies, seed {SEED}");
     let power = match (request.sequential, request.clusters.are_units()) {
         (true, _) => {
-            "power: exact, summed over every outcome at every look; the boundary is that of `stats --sequential`, \
-                      which holds at any number of looks"
-                .to_owned()
+            "exact, summed over every outcome at every look; the boundary is that of `stats --sequential`, which holds \
+             at any number of looks"
         }
-        (false, true) => format!("power: against chance exact; of pairs from {STUDIES} simulated studies, seed {SEED}"),
+        (false, true) => &simulated,
         (false, false) => {
-            "power: exact, summed over every outcome of two-sided tests; it rises in steps, so that a few \
-                           more episodes may have a little less"
-                .to_owned()
+            "exact, summed over every outcome of two-sided tests; it rises in steps, so that a few more episodes may \
+             have a little less"
         }
     };
     let mut sentences = vec![
         format!("rates: {rates}{why}"),
         pairs,
         clusters,
-        power,
+        format!("power: {power}"),
         "Holm: the level of the first step, which the smallest p value must meet; later steps ask for less".to_owned(),
     ];
     if let Some(chance) = request.chance {

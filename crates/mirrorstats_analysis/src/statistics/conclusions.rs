@@ -3,9 +3,8 @@
 use indexmap::IndexMap;
 
 use super::rates::chance::own_levels;
-use super::{ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
+use super::{ChanceRow, DurationRow, Family, Method, Reach, Selection, Statistics, Verdict};
 use crate::study::Study;
-use mirrorstats_exact::chance::with_strategy;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_statistics::power::Detectable;
 
@@ -69,12 +68,7 @@ fn reach_sentence(reach: Reach, names: &[String]) -> String {
 fn against_levels(rows: &[ChanceRow]) -> Vec<String> {
     let mut groups: IndexMap<(&str, &str, String), Vec<&ChanceRow>> = IndexMap::new();
     for row in rows {
-        let role = match row.role {
-            Role::Chance => "chance",
-            Role::Reference => "the reference",
-        };
-        let level = format!("{role} ({})", with_strategy(row.level, row.strategy.as_deref()));
-        groups.entry((&row.key.experiment, &row.metric, level)).or_default().push(row);
+        groups.entry((&row.key.experiment, &row.metric, row.against())).or_default().push(row);
     }
     groups.iter().map(|((experiment, metric, level), rows)| level_sentence(experiment, metric, level, rows)).collect()
 }

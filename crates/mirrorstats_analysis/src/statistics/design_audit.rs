@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 use self::checks::{Audit, Ends, by_label, seeds};
 use super::Options;
 use super::comparisons::conditions::Contrast;
-use crate::study::{Block, Experiment, RowKey, SCENE, Study};
+use crate::comparable::SCENE;
+use crate::study::{Block, Experiment, RowKey, Study};
 use mirrorstats_exact::moments::MomentOverflow;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{CONDITION, EpisodeTable};
@@ -27,7 +28,7 @@ pub struct DesignAudit {
 }
 
 /// The episodes of one cell.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct CellDesign {
     #[serde(flatten)]
     pub key: RowKey,
@@ -140,7 +141,7 @@ impl DesignAudit {
             experiment.blocks.iter().map(|block| CellDesign::of(study, experiment, block)).collect()
         };
         let mut cells: Vec<CellDesign> = study.experiments.iter().flat_map(of_experiment).collect();
-        cells.extend(lost_cells.into_iter().map(|(key, lost)| CellDesign::lost(key, lost)));
+        cells.extend(lost_cells.into_iter().map(|(key, lost)| CellDesign { key, lost, ..CellDesign::default() }));
         Self { cells, findings: audit.findings }
     }
 
@@ -170,7 +171,6 @@ impl CellDesign {
         let others: Vec<_> = others.into_iter().map(|other| by_label(study, other, SCENE)).collect();
         let is_shared = |scene: &&&str| others.iter().all(|other| other.contains_key(**scene));
         let ends = Ends::of(study, block);
-        let steps = ends.as_ref().and_then(|ends| ends.unfinished.keys().next().zip(ends.unfinished.keys().last()));
         Self {
             key: block.key(),
             episodes: block.rows().count() as u64,
@@ -179,15 +179,9 @@ impl CellDesign {
             shared_scenes: scenes.keys().filter(is_shared).count() as u64,
             most_repeats: scenes.values().map(Vec::len).max().unwrap_or(0) as u64,
             seeds: seeds(study, block).len() as u64,
-            unfinished: ends.as_ref().map(|ends| ends.unfinished.values().sum()),
-            unfinished_steps: steps.map(|(first, last)| [*first, *last]),
+            unfinished: ends.as_ref().map(Ends::undecided),
+            unfinished_steps: ends.as_ref().and_then(Ends::undecided_steps),
         }
-    }
-
-    fn lost(key: RowKey, lost: u64) -> Self {
-        let (scenes, shared_scenes, most_repeats, seeds) = (0, 0, 0, 0);
-        let (unfinished, unfinished_steps) = (None, None);
-        Self { key, episodes: 0, lost, scenes, shared_scenes, most_repeats, seeds, unfinished, unfinished_steps }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -84,6 +85,11 @@ pub(super) fn first_named(names: impl ExactSizeIterator<Item = String>, most: us
     let rest = names.len().saturating_sub(most);
     let first = names.take(most).collect::<Vec<_>>().join("; ");
     if rest > 0 { format!("{first}; and {rest} more") } else { first }
+}
+
+/// `3`, or `3 to 5`.
+pub(crate) fn span<N: Copy + Display + PartialEq>(least: N, most: N) -> String {
+    if least == most { least.to_string() } else { format!("{least} to {most}") }
 }
 
 /// A filter over episodes.

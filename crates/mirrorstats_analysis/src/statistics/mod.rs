@@ -39,15 +39,15 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
 pub use apart::SettingApart;
-pub use comparisons::compare::{Comparison, Method, Sign};
+pub use comparisons::compare::{Comparison, Equivalence, Method, Sign};
 pub use comparisons::conditions::Contrast;
-pub use comparisons::family::Equivalence;
 pub use comparisons::losses::{LossCase, LossCases, LossRow, Losses};
 pub use comparisons::matching::{Matching, Units};
 pub use comparisons::models::{Family, Gap, PairTest, Reach};
 pub use comparisons::retest::RetestRow;
 pub use comparisons::trends::{Dose, TrendRow};
 pub use design_audit::{CellDesign, DesignAudit, DesignCheck, DesignFinding, Touched};
+pub(crate) use episodes::span;
 pub use episodes::{Replies, Selection, UnusableReplies};
 pub use options::Options;
 pub(crate) use rates::cells::FEW;
@@ -157,12 +157,12 @@ impl Statistics {
     /// outside (0, 1), intervals and verdicts are undefined.
     pub fn from_table(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::from_table(table, options.design, options.lost.as_ref(), None)?;
-        (study.pool, study.margin) = (options.pooled.is_some(), options.margin);
         let confidence = options.confidence;
+        (study.confidence, study.pool, study.margin) = (confidence, options.pooled.is_some(), options.margin);
         let headline = conclusions::headline(&study);
         let asked: &[String] = if options.improvements { &headline } else { &[] };
-        let (models, gaps) = models::compared(&study, confidence);
-        let overall = overall::rates(&study, &models, &headline, confidence);
+        let (models, gaps) = models::compared(&study);
+        let overall = overall::rates(&study, &models, &headline);
         let mut statistics = Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
@@ -173,19 +173,19 @@ impl Statistics {
             pooled: options.pooled_in(&study),
             audit: DesignAudit::of(&study, options),
             design: options.design,
-            cells: CellRow::all(&study, cells, confidence),
-            chance: ChanceRow::all(&study, confidence),
+            cells: CellRow::all(&study, cells),
+            chance: ChanceRow::all(&study),
             ranks: RankRow::all(&models, &overall),
             models,
             overall,
-            improvements: overall::improvements(&study, asked, confidence),
+            improvements: overall::improvements(&study, asked),
             gaps,
-            conditions: Contrast::all(&study, confidence),
-            trends: TrendRow::all(&study, &headline, confidence),
-            clusters: ClusterRow::all(&study, confidence),
-            durations: DurationRow::all(&study, confidence),
+            conditions: Contrast::all(&study),
+            trends: TrendRow::all(&study, &headline),
+            clusters: ClusterRow::all(&study),
+            durations: DurationRow::all(&study),
             retests: RetestRow::all(&study),
-            losses: Losses::of(&study, options.lost.is_some(), confidence),
+            losses: Losses::of(&study, options.lost.is_some()),
             replies: options.replies.clone(),
             headline,
             relations: study.relations.clone(),

@@ -2,7 +2,7 @@
 
 use super::comparisons::conditions::Contrast;
 use super::episodes::{Replies, Selection};
-use crate::study::Study;
+use crate::study::{Study, couples};
 use mirrorstats_score::cells::interval::CONFIDENCE;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_statistics::design::Design;
@@ -56,10 +56,7 @@ impl Options {
     /// The settings that cells pool or that compared blocks differ in, one sentence each; empty without pooling.
     pub(super) fn pooled_in(&self, study: &Study) -> Vec<String> {
         let Some(mut sentences) = self.pooled.clone() else { return Vec::new() };
-        let models = study.experiments.iter().flat_map(|experiment| {
-            let blocks = &experiment.blocks;
-            (0..blocks.len()).flat_map(move |at| blocks[at + 1..].iter().map(move |other| (&blocks[at], other)))
-        });
+        let models = study.experiments.iter().flat_map(|experiment| couples(&experiment.blocks));
         let contrasts = Contrast::pairs(study).into_iter().flat_map(|pair| pair.couples().collect::<Vec<_>>());
         for (first, second) in models.chain(contrasts) {
             let Some(setting) = study.setting_apart(first, second) else { continue };

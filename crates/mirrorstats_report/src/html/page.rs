@@ -22,7 +22,7 @@ use mirrorstats_score::cells::group::group;
 use mirrorstats_score::cells::{Cell, Cells};
 use mirrorstats_score::tables::table::{EpisodeTable, KeyRef};
 use mirrorstats_statistics::intervals::interval::Interval;
-use mirrorstats_tables::{DAGGER, Emphasis, ListTable};
+use mirrorstats_tables::{Column, DAGGER, Emphasis, ListTable};
 
 pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
     // A cell whose episodes were all lost has no row in the table.
@@ -78,11 +78,12 @@ fn table(table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, 
 
 fn column(column: &MetricColumn) -> Json {
     // The initial sort direction.
-    let best_first = match column.better {
+    let Column { heading, better, .. } = &column.printed;
+    let best_first = match better {
         Better::Higher | Better::Neither => "descending",
         Better::Lower => "ascending",
     };
-    json!({ "metric": visible(&column.metric), "heading": visible(&column.heading), "arrow": column.better.arrow(), "best_first": best_first })
+    json!({ "metric": visible(&column.metric), "heading": visible(heading), "arrow": better.arrow(), "best_first": best_first })
 }
 
 fn row_group(group: &MetricRows, table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {

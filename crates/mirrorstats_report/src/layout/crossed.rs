@@ -1,62 +1,45 @@
 //! Tables of models by experiments: one group of rows for each metric, as papers about robots print them.
 
+use std::iter;
+
+use indexmap::IndexSet;
+
 use super::metric_table::{MetricCell, MetricColumn, MetricRows, MetricTable};
 use crate::style::TableLayout;
-use mirrorstats_tables::{Column, Look, RowGroup, Table, TableCell};
+use mirrorstats_tables::{Column, RowGroup, TableCell};
 
 /// The heading of the means over experiments.
 const MEAN: &str = "Mean";
 
 impl MetricTable {
-    /// The table with models on one side and experiments on the other.
-    pub(super) fn crossed(&self) -> Table {
-        let models = self.models();
+    /// The columns and rows with models on one side and experiments on the other.
+    pub(super) fn crossed(&self) -> (Vec<Column>, Vec<RowGroup>) {
+        // In the order of their first rows.
+        let models = Vec::from_iter(self.rows().map(|row| row.name.as_str()).collect::<IndexSet<_>>());
+        let means = (!self.means.is_empty()).then_some(MEAN);
+        let experiments: Vec<&str> = self.groups.iter().map(|group| group.short.as_str()).chain(means).collect();
         let is_by_model = self.layout == TableLayout::ModelsByExperiments;
-        let mut experiments: Vec<&str> = self.groups.iter().map(|group| group.short.as_str()).collect();
-        experiments.extend((!self.means.is_empty()).then_some(MEAN));
-        let (heading, across) =
-            if is_by_model { (self.row_heading.as_str(), &experiments) } else { ("Experiment", &models) };
-        let columns = std::iter::once(Column::left(heading)).chain(across.iter().map(|name| Column::right(*name)));
-        let group = |(at, column): (usize, &MetricColumn)| RowGroup {
-            heading: Some(match column.better.arrow() {
-                Some(arrow) => format!("{} {arrow}", column.heading),
-                None => column.heading.clone(),
-            }),
-            rows: if is_by_model {
-                let row = |model: &&str| {
-                    let cells = (0..experiments.len()).map(|place| self.crossed_cell(place, model, at));
-                    std::iter::once((*model).into()).chain(cells).collect()
-                };
-                models.iter().map(row).collect()
-            } else {
-                let row = |(place, name): (usize, &&str)| {
-                    let cells = models.iter().map(|model| self.crossed_cell(place, model, at));
-                    std::iter::once((*name).into()).chain(cells).collect()
-                };
-                experiments.iter().enumerate().map(row).collect()
-            },
+        let (heading, down, across) = if is_by_model {
+            (self.row_heading.as_str(), &models, &experiments)
+        } else {
+            ("Experiment", &experiments, &models)
         };
-        Table {
-            title: self.title.clone(),
-            sentences: self.sentences().map(str::to_owned).collect(),
-            label: self.label.clone(),
-            look: Look::Sheet,
-            columns: columns.collect(),
-            names: 1,
-            is_tied: self.is_tied,
-            groups: self.columns.iter().enumerate().map(group).collect(),
-        }
-    }
-
-    /// The models of all groups in the order of their first rows.
-    fn models(&self) -> Vec<&str> {
-        let mut models = Vec::new();
-        for row in self.rows() {
-            if !models.contains(&row.name.as_str()) {
-                models.push(row.name.as_str());
+        let group = |(metric, column): (usize, &MetricColumn)| {
+            let row = |(row, name): (usize, &&str)| {
+                let cell = |at: usize| {
+                    let (experiment, model) = if is_by_model { (at, row) } else { (row, at) };
+                    self.crossed_cell(experiment, models[model], metric)
+                };
+                iter::once((*name).into()).chain((0..across.len()).map(cell)).collect()
+            };
+            let Column { heading, better, .. } = &column.printed;
+            RowGroup {
+                heading: Some(better.arrow().map_or_else(|| heading.clone(), |arrow| format!("{heading} {arrow}"))),
+                rows: down.iter().enumerate().map(row).collect(),
             }
-        }
-        models
+        };
+        let columns = iter::once(Column::left(heading)).chain(across.iter().map(|name| Column::right(*name)));
+        (columns.collect(), self.columns.iter().enumerate().map(group).collect())
     }
 
     /// The cell of a model in an experiment, or its mean behind the last one; the text for undefined if there is none.

@@ -3,15 +3,17 @@
 //! Rule: all decisions are already made here (columns, order, rounding, emphasis, marks). [`MetricTable::printed`] is
 //! for people, [`MetricTable::records`] for programs.
 
+use std::iter;
+
 use crate::layout::key_field;
 use crate::style::{CellForm, Style, TableLayout};
 use mirrorstats_analysis::statistics::Ranks;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::Decimal;
-use mirrorstats_metric::catalogs::catalog::{Better, Catalog};
+use mirrorstats_metric::catalogs::catalog::Catalog;
 use mirrorstats_score::cells::KeyValue;
 use mirrorstats_score::tables::table::CONDITION;
-use mirrorstats_tables::{Align, Column, Emphasis, ListTable, Look, RowGroup, Table, TableCell};
+use mirrorstats_tables::{Column, Emphasis, ListTable, Look, RowGroup, Table, TableCell};
 
 /// A table of cells under a style.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,11 +48,9 @@ pub struct MetricTable {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MetricColumn {
     pub metric: String,
-    /// The heading: the style's; else the title in domains other than the mirror, whose metrics the paper abbreviates.
-    pub heading: String,
-    /// The heading as LaTeX, if the escaped text does not suffice.
-    pub latex: Option<String>,
-    pub better: Better,
+    /// As printed. The heading is the style's; else the title in domains other than the mirror, whose metrics the paper
+    /// abbreviates.
+    pub printed: Column,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -125,12 +125,10 @@ impl MetricColumn {
         let sheet = style.sheet.column.get(metric);
         let title = || catalog.domain.as_ref().and(catalog.metric.get(metric)).map(|metric| metric.title.clone());
         let heading = sheet.and_then(|column| column.header.clone()).or_else(title);
-        Self {
-            metric: metric.to_owned(),
-            heading: heading.unwrap_or_else(|| metric.to_owned()),
-            latex: sheet.and_then(|column| column.latex.clone()),
-            better: style.sheet.better(metric, catalog),
-        }
+        let latex = sheet.and_then(|column| column.latex.clone());
+        let better = style.sheet.better(metric, catalog);
+        let column = Column::right(heading.unwrap_or_else(|| metric.to_owned()));
+        Self { metric: metric.to_owned(), printed: Column { latex, better, ..column } }
     }
 }
 
@@ -165,7 +163,7 @@ impl MetricTable {
 
     /// The caption without its title: note and footnotes.
     pub(crate) fn sentences(&self) -> impl Iterator<Item = &str> {
-        std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
+        iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
     }
 
     /// Both forms of the table.
@@ -179,33 +177,33 @@ impl MetricTable {
 
     /// For people: one line per row.
     pub fn printed(&self) -> Table {
-        if self.layout != TableLayout::Grouped {
-            return self.crossed();
-        }
-        let columns = self.columns.iter().map(|column| Column {
-            heading: column.heading.clone(),
-            latex: column.latex.clone(),
-            better: column.better,
-            align: Align::Right,
-        });
-        let cells = |row: &MetricRow| {
-            let cells = row.cells.iter().map(|cell| cell.printed(&self.undefined));
-            std::iter::once(row.name.as_str().into()).chain(cells).collect()
-        };
-        let group = |group: &MetricRows| RowGroup {
-            heading: group.heading.clone(),
-            rows: group.rows.iter().map(cells).collect(),
+        let (columns, groups) = match self.layout {
+            TableLayout::Grouped => self.grouped(),
+            TableLayout::ModelsByExperiments | TableLayout::ExperimentsByModels => self.crossed(),
         };
         Table {
             title: self.title.clone(),
             sentences: self.sentences().map(str::to_owned).collect(),
             label: self.label.clone(),
             look: Look::Sheet,
-            columns: std::iter::once(Column::left(&self.row_heading)).chain(columns).collect(),
+            columns,
             names: 1,
             is_tied: self.is_tied,
-            groups: self.groups.iter().map(group).collect(),
+            groups,
         }
+    }
+
+    fn grouped(&self) -> (Vec<Column>, Vec<RowGroup>) {
+        let columns = self.columns.iter().map(|column| column.printed.clone());
+        let row = |row: &MetricRow| {
+            let cells = row.cells.iter().map(|cell| cell.printed(&self.undefined));
+            iter::once(row.name.as_str().into()).chain(cells).collect()
+        };
+        let groups = self
+            .groups
+            .iter()
+            .map(|group| RowGroup { heading: group.heading.clone(), rows: group.rows.iter().map(row).collect() });
+        (iter::once(Column::left(&self.row_heading)).chain(columns).collect(), groups.collect())
     }
 
     /// For programs: one line per cell, numbers as printed.
@@ -256,7 +254,7 @@ impl MetricCell {
 
     fn fields(&self, form: CellForm) -> Vec<String> {
         let text = |number: Option<Decimal>| number.map(|number| number.to_string()).unwrap_or_default();
-        let (mean, emphasis) = (text(self.value.mean()), self.emphasis.word().to_owned());
+        let (mean, emphasis) = (text(self.value.mean()), self.emphasis.name().to_owned());
         match form {
             CellForm::MeanSe => vec![mean, text(self.value.se()), emphasis],
             CellForm::CountInterval => {

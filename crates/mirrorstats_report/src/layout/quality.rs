@@ -26,27 +26,30 @@ pub fn text(cells: &QualityByCell, width: Option<usize>) -> String {
     of_cells(cells).map_or_else(String::new, |table| table.printed.lines(width))
 }
 
-fn keys_and<'a>(keys: usize, others: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
-    ["experiment", "model", "condition"].into_iter().take(keys).chain(others)
+const KEYS: [&str; 3] = ["experiment", "model", "condition"];
+
+fn names(key: &CellKey) -> [String; 3] {
+    [&key.experiment, &key.model, &key.condition].map(Clone::clone)
+}
+
+/// The first `keys` of the key columns, then the others.
+fn keyed<T>(of: [T; 3], keys: usize, others: impl IntoIterator<Item = T>) -> impl Iterator<Item = T> {
+    of.into_iter().take(keys).chain(others)
 }
 
 fn printed(cells: &QualityByCell, keys: usize) -> Table {
-    let header =
-        ["episodes", "lost", "steps", "no decision", "reasons", "repaired", "latency, ms", "tokens", "cost, USD"];
+    let header = keyed(KEYS, keys, row(&Quality::default()).map(|(heading, _)| heading));
     let table = Table {
         title: "Data quality".to_owned(),
         sentences: notes(cells),
         label: Some("tab:quality".to_owned()),
-        ..Table::list(Look::Ruled, keys, keys_and(keys, header).map(Column::left))
+        ..Table::list(Look::Ruled, keys, header.map(Column::left))
     };
-    table.with(cells.0.iter().map(|(key, quality)| row(key, quality, keys)))
+    table.with(cells.0.iter().map(|(key, quality)| keyed(names(key), keys, row(quality).map(|(_, text)| text))))
 }
 
-fn names(key: &CellKey, keys: usize) -> impl Iterator<Item = &String> {
-    [&key.experiment, &key.model, &key.condition].into_iter().take(keys)
-}
-
-fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
+/// The texts for people, each with its heading.
+fn row(quality: &Quality) -> [(&'static str, String); 9] {
     let known = |is_known: bool, text: String| if is_known { text } else { UNKNOWN.to_owned() };
     let recorded = quality.replies() > 0;
     let repaired = match (quality.of_status("repaired"), listed(quality.repairs.iter())) {
@@ -57,18 +60,17 @@ fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
     let latency = latency.map(|(median, slow)| format!("{median}; 95 % within {slow}"));
     let tokens = [quality.prompt_tokens, quality.completion_tokens].map(Total::mean);
     let [prompt, completion] = tokens.map(|tokens| fixed(tokens, 0));
-    let texts = [
-        quality.episodes.to_string(),
-        quality.lost.map_or_else(|| UNKNOWN.to_owned(), |lost| lost.to_string()),
-        quality.steps.to_string(),
-        known(recorded, share(quality.unusable(), quality.replies())),
-        known(recorded, listed(quality.unread())),
-        known(recorded, repaired),
-        latency.unwrap_or_else(|| UNKNOWN.to_owned()),
-        known(tokens.iter().any(Option::is_some), format!("{prompt} + {completion}")),
-        known(quality.cost_nano_usd.replies > 0, cost(quality, 4)),
-    ];
-    names(key, keys).cloned().chain(texts).collect()
+    [
+        ("episodes", quality.episodes.to_string()),
+        ("lost", quality.lost.map_or_else(|| UNKNOWN.to_owned(), |lost| lost.to_string())),
+        ("steps", quality.steps.to_string()),
+        ("no decision", known(recorded, share(quality.unusable(), quality.replies()))),
+        ("reasons", known(recorded, listed(quality.unread()))),
+        ("repaired", known(recorded, repaired)),
+        ("latency, ms", latency.unwrap_or_else(|| UNKNOWN.to_owned())),
+        ("tokens", known(tokens.iter().any(Option::is_some), format!("{prompt} + {completion}"))),
+        ("cost, USD", known(quality.cost_nano_usd.replies > 0, cost(quality, 4))),
+    ]
 }
 
 #[expect(clippy::cast_precision_loss, reason = "a share for people")]
@@ -116,46 +118,40 @@ pub fn unread_identifications(cells: &QualityByCell) -> Option<String> {
 }
 
 fn records(cells: &QualityByCell, keys: usize) -> Table {
-    let tail = [
-        "unusable",
-        "other_status",
-        "repairs",
-        "latency_median_ms",
-        "latency_95_ms",
-        "prompt_tokens",
-        "completion_tokens",
-        "cost_usd",
-    ];
-    let header = ["episodes", "lost", "steps", "replies"].into_iter().chain(statuses().iter().copied()).chain(tail);
-    let table = Table::of_texts(keys_and(keys, header));
-    table.with(cells.0.iter().map(|(key, quality)| record(key, quality, keys)))
+    let header = keyed(KEYS, keys, record(&Quality::default()).into_iter().map(|(heading, _)| heading));
+    let line = |(key, quality): (&CellKey, &Quality)| {
+        let names = names(key).map(|name| text_field(&name));
+        keyed(names, keys, record(quality).into_iter().map(|(_, text)| text))
+    };
+    Table::of_texts(header).with(cells.0.iter().map(line))
 }
 
-fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
+/// The texts for programs, each with its heading.
+fn record(quality: &Quality) -> Vec<(&'static str, String)> {
     let known = |is_known: bool, text: String| if is_known { text } else { String::new() };
     let count = |count: u64| known(quality.replies() > 0, count.to_string());
     let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
-    let by_status = statuses().iter().map(|status| quality.of_status(status));
-    let other_status = quality.replies() - by_status.clone().sum::<u64>();
+    let by_status = statuses().iter().map(|status| (*status, quality.of_status(status)));
+    let other_status = quality.replies() - by_status.clone().map(|(_, count)| count).sum::<u64>();
     let repairs: Vec<_> = quality.repairs.iter().map(|(name, count)| format!("{name} {count}")).collect();
     let Quality { prompt_tokens, completion_tokens, cost_nano_usd, .. } = quality;
     let head = [
-        quality.episodes.to_string(),
-        quality.lost.map_or_else(String::new, |lost| lost.to_string()),
-        quality.steps.to_string(),
-        count(quality.replies()),
+        ("episodes", quality.episodes.to_string()),
+        ("lost", quality.lost.map_or_else(String::new, |lost| lost.to_string())),
+        ("steps", quality.steps.to_string()),
+        ("replies", count(quality.replies())),
     ];
     let tail = [
-        count(quality.unusable()),
-        count(other_status),
-        repairs.join("; "),
-        optional(quality.latency(MEDIAN)),
-        optional(quality.latency(SLOW)),
-        known(prompt_tokens.replies > 0, prompt_tokens.sum.to_string()),
-        known(completion_tokens.replies > 0, completion_tokens.sum.to_string()),
-        known(cost_nano_usd.replies > 0, cost(quality, 9)),
+        ("unusable", count(quality.unusable())),
+        ("other_status", count(other_status)),
+        ("repairs", repairs.join("; ")),
+        ("latency_median_ms", optional(quality.latency(MEDIAN))),
+        ("latency_95_ms", optional(quality.latency(SLOW))),
+        ("prompt_tokens", known(prompt_tokens.replies > 0, prompt_tokens.sum.to_string())),
+        ("completion_tokens", known(completion_tokens.replies > 0, completion_tokens.sum.to_string())),
+        ("cost_usd", known(cost_nano_usd.replies > 0, cost(quality, 9))),
     ];
-    names(key, keys).map(|name| text_field(name)).chain(head).chain(by_status.map(count)).chain(tail).collect()
+    head.into_iter().chain(by_status.map(|(status, of)| (status, count(of)))).chain(tail).collect()
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ use mirrorstats_exact::number::Decimal;
 use mirrorstats_tables::{Column, Emphasis, Look, Table, push_wrapped};
 
 /// The result of a comparison.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[schemars(rename = "Comparison")]
 pub struct PublishedComparison {
     /// The table of ours.
@@ -99,16 +99,9 @@ pub fn compare(table: &MetricTable, published: &Published, errata: &[Erratum]) -
     let ours = our_cells(table);
     let mut unused: Vec<&Erratum> = errata.iter().filter(|erratum| erratum.table == table.name).collect();
     let about_table = unused.clone();
-    let mut comparison = PublishedComparison {
-        table: table.name.clone(),
-        cells: published.cells.len(),
-        same: 0,
-        excused: 0,
-        differing: 0,
-        differences: Vec::new(),
-        unpublished: unpublished(&ours, published),
-        unused_errata: Vec::new(),
-    };
+    let (table, cells) = (table.name.clone(), published.cells.len());
+    let unpublished = unpublished(&ours, published);
+    let mut comparison = PublishedComparison { table, cells, unpublished, ..PublishedComparison::default() };
     for (name, theirs) in &published.cells {
         let mut found = differences(name, theirs, ours.get(name));
         for difference in &mut found {
@@ -163,7 +156,7 @@ fn differences(name: &CellLabel, theirs: &PrintedCell, ours: Option<&PrintedCell
         return vec![difference(None, shown(theirs), String::new())];
     };
     let number = |field, theirs, ours| (field, is_same(theirs, ours), text(theirs), text(ours));
-    let word = |emphasis: Emphasis| emphasis.word().to_owned();
+    let word = |emphasis: Emphasis| emphasis.name().to_owned();
     let fields = [
         number(Field::Mean, theirs.mean, ours.mean),
         number(Field::Se, theirs.se, ours.se),

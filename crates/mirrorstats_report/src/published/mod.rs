@@ -148,19 +148,14 @@ impl Columns {
             },
         };
         let label = CellLabel { experiment: name(0)?, model: name(1)?, metric: name(2)? };
-        let cell = PrintedCell { mean: number(3)?, se: number(4)?, emphasis: emphasis(record[self.0[5]].trim())? };
+        let (mean, se, emphasis) = (number(3)?, number(4)?, record[self.0[5]].trim());
+        let unknown = || PublishedFault::UnknownEmphasis { found: visible(emphasis) };
+        let cell = PrintedCell { mean, se, emphasis: Emphasis::named(emphasis).ok_or_else(unknown)? };
         match cell.se.filter(|_| cell.mean.is_none()) {
             Some(se) => Err(PublishedFault::StrayStandardError { found: se.to_string() }),
             None => Ok((label, cell)),
         }
     }
-}
-
-fn emphasis(text: &str) -> Result<Emphasis, PublishedFault> {
-    [Emphasis::Plain, Emphasis::Bold, Emphasis::Underline]
-        .into_iter()
-        .find(|emphasis| emphasis.word() == text)
-        .ok_or_else(|| PublishedFault::UnknownEmphasis { found: visible(text) })
 }
 
 #[cfg(test)]

@@ -8,8 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Level, Reference};
-use mirrorstats_analysis::statistics::{ChanceRow, Contrast, Family, Role, Sign, Statistics, Verdict};
-use mirrorstats_exact::chance::with_strategy;
+use mirrorstats_analysis::statistics::{ChanceRow, Contrast, Family, Sign, Statistics, Verdict};
 use mirrorstats_metric::catalogs::catalog::{Better, Catalog};
 
 /// The question behind a conclusion.
@@ -138,12 +137,7 @@ fn conclusions(statistics: &Statistics, catalog: &Catalog, metrics: &[String]) -
 }
 
 fn against_level(row: &ChanceRow) -> (Subject, Shown) {
-    let role = match row.role {
-        Role::Chance => "chance",
-        Role::Reference => "the reference",
-    };
-    let level = with_strategy(row.level, row.strategy.as_deref());
-    let about = format!("{} {} of {} against {role} ({level})", row.key.experiment, row.metric, row.key.name());
+    let about = format!("{} {} of {} against {}", row.key.experiment, row.metric, row.key.name(), row.against());
     let shown = match row.verdict {
         Verdict::Above => Some("above it".to_owned()),
         Verdict::Below => Some("below it".to_owned()),
@@ -166,8 +160,7 @@ fn couple(first: &str, second: &str) -> String {
 }
 
 fn between_experiments(row: &Contrast) -> (Subject, Shown) {
-    let model = row.condition.as_ref().map_or_else(|| row.model.clone(), |it| format!("{} [{it}]", row.model));
-    let about = format!("{} of {model}, {} and {}", row.metric, row.baseline, row.against);
+    let about = format!("{} of {}, {} and {}", row.metric, row.name(), row.baseline, row.against);
     let shown = row.comparison.sign().map(|sign| match sign {
         Sign::Higher => format!("higher in {}", row.baseline),
         Sign::Lower => format!("higher in {}", row.against),

@@ -26,10 +26,12 @@ pub const OTHER_TABLE: &str = "other";
 pub struct Style {
     /// The built-in name, or the file's name without its extension; never a path.
     pub name: String,
-    /// SHA-256 of the file, 64 hexadecimal digits.
+    /// SHA-256 of the text, 64 hexadecimal digits; with includes, of the hashes of all texts, one per line, in reading
+    /// order.
     pub hash: String,
     pub sheet: StyleSheet,
     pub is_built_in: bool,
+    /// Metrics named by the user's files, with locations.
     named: Vec<(String, Place)>,
 }
 
@@ -228,11 +230,7 @@ pub fn built_in(name: &str) -> Option<&'static str> {
 impl Style {
     /// The built-in style with this name, or else the style in this file.
     pub fn load(name_or_path: impl AsRef<Path>) -> Result<Self, StyleError> {
-        let path = name_or_path.as_ref();
-        let is_built_in = built_in_names().into_iter().any(|name| path == Path::new(name));
-        let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        let read::Read { sheet, named, hash } = read::read(path)?;
-        Ok(Self { name, hash, sheet, is_built_in, named })
+        read::read(name_or_path.as_ref())
     }
 
     /// Checks that the style names only metrics of the definitions. A built-in style may name others.

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use toml::Value;
 
-use super::{MAIN_TABLE, OTHER_TABLE, StyleError, StyleSheet};
+use super::{MAIN_TABLE, OTHER_TABLE, Style, StyleError, StyleSheet};
 use mirrorstats_exact::budget::Limit;
 use mirrorstats_exact::hash;
 use mirrorstats_exact::suggest::hint;
@@ -32,15 +32,7 @@ pub(super) const KIND: FileKind = FileKind {
     most_includes: Limit::new("includes of a style, those of included files counted", 32),
 };
 
-pub(super) struct Read {
-    pub sheet: StyleSheet,
-    /// Metrics named by the user's files, with locations.
-    pub named: Vec<(String, Place)>,
-    /// The SHA-256 of the text; with includes, of the hashes of all texts, one per line, in reading order.
-    pub hash: String,
-}
-
-pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
+pub(super) fn read(path: &Path) -> Result<Style, StyleError> {
     let file = KIND.open(path, path).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => {
             let name = path.display().to_string();
@@ -78,7 +70,10 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
         [one] => one.clone(),
         several => hash::of_bytes(several.join("\n").as_bytes()),
     };
-    Ok(Read { sheet: sheet.expect("without a fault, the outermost file is whole"), named, hash })
+    let sheet = sheet.expect("without a fault, the outermost file is whole");
+    let is_built_in = KIND.built_in_names().into_iter().any(|name| path == Path::new(name));
+    let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    Ok(Style { name, hash, sheet, is_built_in, named })
 }
 
 fn metrics(at: &At<'_>) -> Vec<(String, Place)> {

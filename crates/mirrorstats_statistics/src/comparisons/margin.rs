@@ -308,8 +308,8 @@ impl SideCounts {
     }
 }
 
-/// The maximum-likelihood second rate if the first is lower by `margin`, higher if it is negative; the likelihood rises, then falls. By Newton's
-/// method, within bounds that halve where it leaves them.
+/// The maximum-likelihood second rate if the first is lower by `margin`, or higher if that is negative. The likelihood
+/// rises, then falls: by Newton's method, within bounds that halve where it leaves them.
 fn restricted([a, b]: [f64; 2], [m, n]: [f64; 2], margin: f64) -> f64 {
     // The slope of the log-likelihood, and how fast it falls.
     let slope = |second: f64| {

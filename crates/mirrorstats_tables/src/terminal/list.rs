@@ -75,8 +75,7 @@ fn style(look: Look) -> TableStyle {
 }
 
 fn fitted(table: &Lines, names: usize, width: Option<usize>) -> String {
-    let text = |table: &Lines| table.trim_fmt();
-    let Some(width) = width.filter(|width| widest_line(table) > *width) else { return text(table) };
+    let Some(width) = width.filter(|width| widest_line(table) > *width) else { return table.trim_fmt() };
     let columns = columns(table, names, width);
     let (names, values) = columns.split_at(names.min(columns.len()));
     let blocks = blocks(names, values, width);
@@ -92,7 +91,7 @@ fn fitted(table: &Lines, names: usize, width: Option<usize>) -> String {
                 }
             });
         }
-        text(&part)
+        part.trim_fmt()
     });
     texts.collect::<Vec<_>>().join("\n\n")
 }

@@ -15,6 +15,10 @@ use mirrorstats_exact::escape::visible;
 const GAP: &str = "  ";
 const LEAST_ROOM: usize = 40;
 
+const BOLD: &str = "\x1b[1m";
+const UNDERLINE: &str = "\x1b[4m";
+const RESET: &str = "\x1b[0m";
+
 pub fn render(table: &Table, terminal: Terminal) -> String {
     let grids = Grid::within(table, terminal);
     let room = terminal.width.unwrap_or_else(|| grids[0].width()).max(LEAST_ROOM);
@@ -40,58 +44,24 @@ pub fn render(table: &Table, terminal: Terminal) -> String {
     lines.join("\n") + "\n"
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum RowShape {
-    OneLine,
-    TwoLines,
-}
-
-#[derive(Clone, Default)]
-struct Piece {
-    text: String,
-    width: usize,
-}
-
-impl Piece {
-    fn new(text: String) -> Self {
-        Self { width: text.width(), text }
-    }
-
-    fn emphasised(text: &str, emphasis: Emphasis, marks: Marks) -> Self {
-        match (emphasis, marks) {
-            (Emphasis::Plain, _) => Self::new(text.to_owned()),
-            (Emphasis::Bold, Marks::Signs) => Self::new(format!("*{text}*")),
-            (Emphasis::Underline, Marks::Signs) => Self::new(format!("_{text}_")),
-            (Emphasis::Bold, Marks::Ansi) => Self { text: format!("\x1b[1m{text}\x1b[0m"), width: text.width() },
-            (Emphasis::Underline, Marks::Ansi) => Self { text: format!("\x1b[4m{text}\x1b[0m"), width: text.width() },
-        }
-    }
-
-    fn followed_by(self, text: &str) -> Self {
-        Self { width: self.width + text.width(), text: self.text + text }
-    }
-
-    fn to_the_right(&self, width: usize) -> String {
-        format!("{}{}", " ".repeat(width.saturating_sub(self.width)), self.text)
-    }
-
-    fn to_the_left(&self, width: usize) -> String {
-        format!("{}{}", self.text, " ".repeat(width.saturating_sub(self.width)))
-    }
+/// The columns that a text takes; the sequences of emphasis take none. Names have no such sequences: [`visible`] spells
+/// them out.
+fn shown_width(text: &str) -> usize {
+    [BOLD, UNDERLINE, RESET].iter().fold(text.to_owned(), |text, sequence| text.replace(sequence, "")).width()
 }
 
 /// Every cell as lines, and the widths of the columns; column 0 has the row names.
 struct Grid {
-    header: Vec<Piece>,
-    groups: Vec<Vec<Vec<Vec<Piece>>>>,
+    header: Vec<String>,
+    groups: Vec<Vec<Vec<Vec<String>>>>,
     widths: Vec<usize>,
 }
 
 impl Grid {
     fn within(table: &Table, terminal: Terminal) -> Vec<Self> {
-        let one_line = Self::new(table, terminal.emphasis, RowShape::OneLine);
+        let one_line = Self::new(table, terminal.emphasis, false);
         let Some(width) = terminal.width.filter(|width| one_line.width() > *width) else { return vec![one_line] };
-        let two_lines = Self::new(table, terminal.emphasis, RowShape::TwoLines);
+        let two_lines = Self::new(table, terminal.emphasis, true);
         if two_lines.width() <= width { vec![two_lines] } else { two_lines.split(width) }
     }
 
@@ -116,15 +86,14 @@ impl Grid {
 
     fn break_names(&mut self, room: usize) {
         for cell in self.groups.iter_mut().flatten().filter_map(|row| row.first_mut()) {
-            let lines = cell.iter().flat_map(|piece| broken(&piece.text, room));
-            *cell = lines.map(Piece::new).collect();
+            *cell = cell.iter().flat_map(|line| broken(line, room)).collect();
         }
-        let names = self.groups.iter().flatten().filter_map(|row| row.first()).flatten();
-        self.widths[0] = names.map(|piece| piece.width).fold(self.header[0].width, usize::max);
+        let names = self.groups.iter().flatten().filter_map(|row| row.first()).flatten().chain([&self.header[0]]);
+        self.widths[0] = names.map(|line| shown_width(line)).max().unwrap_or(0);
     }
 
     fn only(&self, columns: &[usize]) -> Self {
-        let row = |row: &Vec<Vec<Piece>>| columns.iter().map(|&at| row[at].clone()).collect();
+        let row = |row: &Vec<Vec<String>>| columns.iter().map(|&at| row[at].clone()).collect();
         Self {
             header: columns.iter().map(|&at| self.header[at].clone()).collect(),
             groups: self.groups.iter().map(|group| group.iter().map(row).collect()).collect(),
@@ -132,15 +101,16 @@ impl Grid {
         }
     }
 
-    fn new(table: &Table, marks: Marks, shape: RowShape) -> Self {
-        let header: Vec<Piece> = table.columns.iter().map(|column| Piece::new(column.spelled(visible))).collect();
-        let pieces = |row: &Vec<TableCell>| row.iter().map(|cell| spell(cell, marks, shape)).collect();
-        let groups: Vec<Vec<Vec<Vec<Piece>>>> =
-            table.groups.iter().map(|group| group.rows.iter().map(pieces).collect()).collect();
-        let mut widths: Vec<usize> = header.iter().map(|piece| piece.width).collect();
+    /// Cells in one line each, or in two, with the uncertainty below.
+    fn new(table: &Table, marks: Marks, in_two: bool) -> Self {
+        let header: Vec<String> = table.columns.iter().map(|column| column.spelled(visible)).collect();
+        let lines = |row: &Vec<TableCell>| row.iter().map(|cell| spell(cell, marks, in_two)).collect();
+        let groups: Vec<Vec<Vec<Vec<String>>>> =
+            table.groups.iter().map(|group| group.rows.iter().map(lines).collect()).collect();
+        let mut widths: Vec<usize> = header.iter().map(|text| shown_width(text)).collect();
         for row in groups.iter().flatten() {
             for (width, cell) in widths.iter_mut().zip(row) {
-                *width = cell.iter().map(|piece| piece.width).fold(*width, usize::max);
+                *width = cell.iter().map(|line| shown_width(line)).fold(*width, usize::max);
             }
         }
         Self { header, groups, widths }
@@ -177,24 +147,23 @@ impl Grid {
         lines
     }
 
-    fn line(&self, pieces: &[Piece]) -> String {
-        let aligned = pieces.iter().zip(&self.widths).enumerate().map(|(at, (piece, &width))| match at {
-            0 => piece.to_the_left(width),
-            _ => piece.to_the_right(width),
+    fn line(&self, texts: &[String]) -> String {
+        let aligned = texts.iter().zip(&self.widths).enumerate().map(|(at, (text, width))| {
+            let room = " ".repeat(width.saturating_sub(shown_width(text)));
+            if at == 0 { format!("{text}{room}") } else { format!("{room}{text}") }
         });
         aligned.collect::<Vec<_>>().join(GAP).trim_end().to_owned()
     }
 }
 
-fn spell(cell: &TableCell, marks: Marks, shape: RowShape) -> Vec<Piece> {
-    let (text, mark) = (visible(&cell.text), cell.mark());
-    let emphasised = |text: &str| Piece::emphasised(text, cell.emphasis, marks);
-    match (&cell.detail, shape) {
-        (Some(detail), RowShape::OneLine) if cell.is_whole => {
-            vec![emphasised(&format!("{text} {detail}")).followed_by(mark)]
-        }
-        (Some(detail), RowShape::OneLine) => vec![emphasised(&text).followed_by(&format!("{mark} {detail}"))],
-        (Some(detail), RowShape::TwoLines) => vec![emphasised(&text).followed_by(mark), Piece::new(detail.clone())],
-        (None, _) => vec![emphasised(&text).followed_by(mark)],
+fn spell(cell: &TableCell, marks: Marks, in_two: bool) -> Vec<String> {
+    let [bold, underline] = match marks {
+        Marks::Signs => [["*"; 2], ["_"; 2]],
+        Marks::Ansi => [[BOLD, RESET], [UNDERLINE, RESET]],
+    };
+    let spelled = |cell: &TableCell| cell.marked_up(visible, bold, underline);
+    match &cell.detail {
+        Some(detail) if in_two => vec![spelled(&TableCell { detail: None, ..cell.clone() }), detail.clone()],
+        _ => vec![spelled(cell)],
     }
 }

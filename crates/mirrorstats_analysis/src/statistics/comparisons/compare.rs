@@ -5,14 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::family::Equivalence;
 use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward};
-use crate::statistics::comparisons::matching::{Matched, Sides, Units, outcomes};
+use crate::statistics::comparisons::matching::{Matched, Sides, Units, outcomes, selection};
 use crate::statistics::comparisons::retest::repeat_variance;
 use crate::statistics::rates::durations::{decided, is_duration};
 use crate::study::{Block, Study, Unit};
 use mirrorstats_exact::moments::Moments;
-use mirrorstats_metric::catalogs::catalog::{Kind, Metric, StandardError};
+use mirrorstats_metric::catalogs::catalog::{Metric, StandardError};
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::comparisons::holm::{is_significant, level};
 use mirrorstats_statistics::comparisons::margin::Counts;
@@ -47,6 +46,17 @@ pub enum Method {
     /// Rates of scenes, seeds or participants with several episodes, or of which some are pairs: the exact permutation
     /// test within shared units and among the others; no interval.
     Units,
+}
+
+/// The test of a difference smaller than a margin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Equivalence {
+    /// The margin, in the unit of the metric.
+    pub margin: f64,
+    /// The p value of a difference of the margin or more in either direction, adjusted by Holm's method over the family.
+    pub p_adjusted: f64,
+    /// True if the difference is shown to be smaller than the margin.
+    pub is_shown: bool,
 }
 
 /// The first minus the second.
@@ -125,11 +135,7 @@ pub(crate) struct Compared<'s, 'a> {
 impl Compared<'_, '_> {
     /// The comparison under one metric, in its unit, before adjustment.
     pub(crate) fn under(&self, column: &MetricColumn) -> Comparison {
-        let found = self.stored(column);
-        match self.study.metric(&column.name) {
-            Some(metric) => found.in_unit(metric),
-            None => found,
-        }
+        self.stored(column).in_unit(self.study.metric(&column.name))
     }
 
     /// The comparison of the stored values.
@@ -176,7 +182,7 @@ impl Compared<'_, '_> {
     /// The comparison without the lost episodes of both sides, or with them. In a comparison by pairs or units, each
     /// lost episode is a pair against a known outcome, which is its largest possible effect.
     fn assuming(&self, lost: Option<Toward>, column: &MetricColumn, sides: Option<&Sides>) -> Comparison {
-        let rates = self.study.kind(&column.name) == Kind::Rate;
+        let rates = self.study.is_rate(&column.name);
         match sides {
             Some(sides) if rates => self.rates_by_unit(lost, column, sides),
             _ if !rates && self.is_dependent() => self.quantity_by_unit(lost, column),
@@ -216,7 +222,7 @@ impl Compared<'_, '_> {
             unit_means,
             pairs: pairs.map(|rows| outcomes(column, rows)),
             p: test.map(|test| test.p),
-            units: Some(Units::between(self.study, [self.first, self.second], sides, least, self.confidence)),
+            units: Some(Units::between(self.study, [self.first, self.second], sides, least)),
             counts,
             ..Comparison::of(Method::Units, [a.n, b.n])
         };
@@ -259,7 +265,7 @@ impl Compared<'_, '_> {
         let n = if is_paired { sides.shared.len() } else { sides.first.len().min(sides.second.len()) };
         let found = by_units(&sides, horizon, self.confidence);
         let least = if (n as u64) < fewest_of(self.confidence) { 1.0 } else { 0.0 };
-        let units = Units::new(self.study, self.first, n, least, self.confidence);
+        let units = Units::new(self.study, self.first, n, least);
         let method = if is_paired { Method::RestrictedMeanPaired } else { Method::RestrictedMean };
         let tested = Comparison::of_durations(method, [n as u64; 2], found, self.confidence);
         Comparison { n: seen.n, units: Some(units), unit_means: first.zip(second).map(<[f64; 2]>::from), ..tested }
@@ -281,7 +287,7 @@ impl Compared<'_, '_> {
         if is_duration(self.study, &column.name) {
             return self.durations(lost, column);
         }
-        let rates = self.study.kind(&column.name) == Kind::Rate;
+        let rates = self.study.is_rate(&column.name);
         match &self.matched.pairs {
             Some(pairs) if rates => self.paired_rate(lost, column, pairs),
             Some(pairs) => self.paired_quantity(column, pairs),
@@ -376,18 +382,6 @@ impl Compared<'_, '_> {
         let pairs: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
         paired(&pairs, horizon, self.confidence)
     }
-}
-
-/// The selection of two sides by the condition of a metric, such as success; `None` if the metric is defined in all their
-/// episodes or in none of a side. What selects episodes may be what the sides differ in, so that a difference among the selected ones is no
-/// difference of the sides (Frangakis and Rubin 2002, principal stratification).
-pub(crate) fn selection(study: &Study, column: &MetricColumn, sides: [&Block; 2]) -> Option<String> {
-    let counts = sides.map(|block| (block.moments(column).n, block.rows().count() as u64));
-    // A side without any value is not compared at all.
-    let is_part = counts.iter().any(|(defined, all)| defined < all) && counts.iter().all(|(defined, _)| *defined > 0);
-    let is_conditional = study.metric(&column.name).is_some_and(|metric| metric.when.is_some());
-    let [(a, m), (b, n)] = counts;
-    (is_conditional && is_part).then(|| format!("defined in {a} of {m} against {b} of {n} episodes"))
 }
 
 impl Comparison {

@@ -69,11 +69,11 @@ impl<'s, 'a> ConditionPair<'s, 'a> {
 }
 
 impl Contrast {
-    pub(crate) fn name(&self) -> String {
+    pub fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())
     }
 
-    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study) -> Vec<Self> {
         let mut contrasts = Vec::new();
         for pair in Self::pairs(study) {
             let (mut family, columns) = (Vec::new(), pair.columns(study));
@@ -92,7 +92,7 @@ impl Contrast {
                     baseline: first.experiment.to_owned(),
                     against: second.experiment.to_owned(),
                     matching: matched.matching,
-                    comparison: compared(at, column, confidence),
+                    comparison: compared(at, column, study.confidence),
                 };
                 family.extend(columns.iter().map(|column| (at, under(column))));
             }
@@ -100,7 +100,7 @@ impl Contrast {
                 let of_metric = family.iter_mut().filter(|(_, it): &&mut (usize, Self)| it.metric == column.name);
                 let again = |at: usize| move |confidence| compared(at, column, confidence);
                 let of_metric = of_metric.map(|(at, it)| (&mut it.comparison, again(*at)));
-                adjust(of_metric, study.margin_of(column), confidence);
+                adjust(of_metric, study.margin_of(column), study.confidence);
             }
             contrasts.extend(family.into_iter().map(|(_, contrast)| contrast));
         }

@@ -1,25 +1,11 @@
 //! The tests of one family together: Holm's adjustment, simultaneous intervals, equivalence, and what they could show.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-use crate::statistics::comparisons::compare::Comparison;
+use crate::statistics::comparisons::compare::{Comparison, Equivalence};
 use crate::statistics::comparisons::losses::{LossCase, settle};
 use crate::statistics::comparisons::matching::{Units, too_few};
 use mirrorstats_statistics::comparisons::holm::{holm, is_significant, level};
 use mirrorstats_statistics::comparisons::margin::Spread;
 use mirrorstats_statistics::intervals::interval::Interval;
-
-/// The test of a difference smaller than a margin.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Equivalence {
-    /// The margin, in the unit of the metric.
-    pub margin: f64,
-    /// The p value of a difference of the margin or more in either direction, adjusted by Holm's method over the family.
-    pub p_adjusted: f64,
-    /// True if the difference is shown to be smaller than the margin.
-    pub is_shown: bool,
-}
 
 impl Comparison {
     /// The smallest true difference that the test would have shown with a probability of 0.8 at this level.

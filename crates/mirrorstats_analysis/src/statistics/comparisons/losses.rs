@@ -35,9 +35,14 @@ pub struct LossRow {
 }
 
 impl Losses {
-    pub(crate) fn of(study: &Study, recorded: bool, confidence: f64) -> Self {
-        let rows = study.blocks().flat_map(|block| of_block(study, block, confidence)).collect();
-        Self { recorded, rows }
+    pub(crate) fn of(study: &Study, recorded: bool) -> Self {
+        let of_rate = |block: &Block, column: &MetricColumn| {
+            let lossy = bounds(block.rows().filter_map(|row| column.get(row)), block.lost, study.confidence)?;
+            Some(LossRow { key: block.key(), metric: column.name.clone(), lossy })
+        };
+        let lossy = study.blocks().filter(|block| block.lost > 0);
+        let rows = lossy.flat_map(|block| study.rates().filter_map(move |column| of_rate(block, column)));
+        Self { recorded, rows: rows.collect() }
     }
 }
 
@@ -143,13 +148,4 @@ pub(crate) fn settle<'c>(
         (p, sign.is_some() && cases.is_none_or(|cases| cases.agree))
     };
     tests.into_iter().enumerate().map(settled).collect()
-}
-
-fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {
-    let of_rate = |column: &MetricColumn| {
-        let values = block.rows().filter_map(|row| column.get(row));
-        let lossy = bounds(values, block.lost, confidence)?;
-        Some(LossRow { key: block.key(), metric: column.name.clone(), lossy })
-    };
-    if block.lost > 0 { study.rates().filter_map(of_rate).collect() } else { Vec::new() }
 }

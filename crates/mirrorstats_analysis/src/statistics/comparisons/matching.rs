@@ -90,6 +90,18 @@ impl Matched {
     }
 }
 
+/// The selection of two sides by the condition of a metric, such as success; `None` if the metric is defined in all their
+/// episodes or in none of a side. What selects episodes may be what the sides differ in. A difference among the selected
+/// ones is then no difference of the sides (Frangakis and Rubin 2002, principal stratification).
+pub(crate) fn selection(study: &Study, column: &MetricColumn, sides: [&Block; 2]) -> Option<String> {
+    let counts = sides.map(|block| (block.moments(column).n, block.rows().count() as u64));
+    // A side without any value is not compared at all.
+    let is_part = counts.iter().any(|(defined, all)| defined < all) && counts.iter().all(|(defined, _)| *defined > 0);
+    let is_conditional = study.metric(&column.name).when.is_some();
+    let [(a, m), (b, n)] = counts;
+    (is_conditional && is_part).then(|| format!("defined in {a} of {m} against {b} of {n} episodes"))
+}
+
 /// Scenes, seeds or participants with several episodes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Units {
@@ -102,15 +114,15 @@ pub struct Units {
 }
 
 impl Units {
-    pub(crate) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
-        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, confidence) }
+    pub(crate) fn new(study: &Study, block: &Block, n: usize, least: f64) -> Self {
+        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few: too_few(n, least, study.confidence) }
     }
 
     /// The units of two sides. Units of different kinds, such as participants and scenes, cannot be tested.
-    pub(super) fn between(study: &Study, blocks: [&Block; 2], sides: &Sides, least: f64, confidence: f64) -> Self {
+    pub(super) fn between(study: &Study, blocks: [&Block; 2], sides: &Sides, least: f64) -> Self {
         let ([first, second], names) = (sides.counts(), blocks.map(|block| study.unit_name(block)));
         if names[0] == names[1] {
-            return Self::new(study, blocks[0], first.min(second), least, confidence);
+            return Self::new(study, blocks[0], first.min(second), least);
         }
         let second = counted(second as u64, singular(names[1]));
         Self { n: first as u64, name: format!("{} against {second}", names[0]), too_few: true }
@@ -133,7 +145,7 @@ pub(crate) fn too_few(n: usize, least: f64, confidence: f64) -> bool {
 }
 
 pub(crate) struct Sides {
-    units: BTreeMap<Unit, (Moments, Moments)>,
+    units: BTreeMap<Unit, [Moments; 2]>,
 }
 
 impl Sides {
@@ -144,25 +156,18 @@ impl Sides {
             return None;
         }
         let sides = Self::by(study, strata, |row| column.get(row));
-        let repeats = sides.units.values().any(|(a, b)| a.n > 1 || b.n > 1);
-        let shared = sides.units.values().filter(|(a, b)| a.n > 0 && b.n > 0).count();
+        let repeats = sides.units.values().flatten().any(|side| side.n > 1);
+        let shared = sides.units.values().filter(|[a, b]| a.n > 0 && b.n > 0).count();
         let is_partly_shared = shared > 0 && shared < sides.units.len();
         (repeats || is_partly_shared).then_some(sides)
     }
 
     pub fn by(study: &Study, strata: &[(&Block, &Block)], value: impl Fn(usize) -> Option<i64>) -> Self {
-        let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
-        let add = |sum: &mut Moments, part: Moments| {
-            sum.n += part.n;
-            sum.sum += part.sum;
-            sum.sum_sq += part.sum_sq;
-        };
-        for (first, second) in strata {
-            for (unit, part) in study.by_unit(first, &value) {
-                add(&mut units.entry(unit).or_default().0, part);
-            }
-            for (unit, part) in study.by_unit(second, &value) {
-                add(&mut units.entry(unit).or_default().1, part);
+        let mut units: BTreeMap<Unit, [Moments; 2]> = BTreeMap::new();
+        for (side, block) in strata.iter().flat_map(|(first, second)| [(0, first), (1, second)]) {
+            for (row, value) in block.rows().filter_map(|row| Some((row, value(row)?))) {
+                let sum = &mut units.entry(study.unit(row)).or_default()[side];
+                *sum = sum.with(value).expect("a part of blocks that were summed whole");
             }
         }
         Self { units }
@@ -170,10 +175,11 @@ impl Sides {
 
     /// The means of both sides, with each unit counted once.
     pub fn means(&self) -> [Option<f64>; 2] {
-        let side = |of: fn(&(Moments, Moments)) -> Moments| -> Vec<Moments> {
-            self.units.values().map(of).filter(|side| side.n > 0).collect()
-        };
-        [units::mean(&side(|unit| unit.0)), units::mean(&side(|unit| unit.1))]
+        [0, 1].map(|side| units::mean(&self.of_side(side).collect::<Vec<_>>()))
+    }
+
+    fn of_side(&self, side: usize) -> impl Iterator<Item = Moments> {
+        self.units.values().map(move |unit| unit[side]).filter(|moments| moments.n > 0)
     }
 
     /// The units on the smaller side.
@@ -182,17 +188,14 @@ impl Sides {
     }
 
     fn counts(&self) -> [usize; 2] {
-        let has = |[first, second]: [usize; 2], (a, b): &(Moments, Moments)| {
-            [first + usize::from(a.n > 0), second + usize::from(b.n > 0)]
-        };
-        self.units.values().fold([0, 0], has)
+        [0, 1].map(|side| self.of_side(side).count())
     }
 
     /// The shared units, and those of one side; `None` if the units of the two sides are of different kinds.
     pub(crate) fn divided(&self) -> Option<units::Sides> {
         let mut sides = units::Sides::default();
         let mut kinds = [None; 2];
-        for (unit, &(a, b)) in &self.units {
+        for (unit, &[a, b]) in &self.units {
             match (a.n, b.n) {
                 (0, _) => sides.second.push(b),
                 (_, 0) => sides.first.push(a),

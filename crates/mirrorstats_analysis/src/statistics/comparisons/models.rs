@@ -10,8 +10,8 @@ use crate::statistics::comparisons::compare::{Compared, Comparison, Method};
 use crate::statistics::comparisons::family::adjust;
 use crate::statistics::comparisons::matching::{Matched, Matching, Scenes};
 use crate::statistics::rates::durations::{self, is_duration};
-use crate::study::{Block, Experiment, RowKey, Study};
-use mirrorstats_metric::catalogs::catalog::{Better, Kind};
+use crate::study::{Block, Experiment, RowKey, Study, couples};
+use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::comparisons::holm::level;
 use mirrorstats_statistics::comparisons::letter_display::tied_sets;
@@ -76,6 +76,13 @@ pub struct Gap {
     pub episodes: usize,
 }
 
+/// A metric, and the horizon of a duration.
+#[derive(Clone, Copy)]
+struct Asked<'c> {
+    column: &'c MetricColumn,
+    horizon: Option<i64>,
+}
+
 /// All blocks of an experiment, each matched with each once for all metrics.
 struct MatchedBlocks<'s, 'a> {
     study: &'s Study<'a>,
@@ -91,12 +98,8 @@ impl<'s, 'a> MatchedBlocks<'s, 'a> {
         Self { study, blocks: &experiment.blocks, matched: scenes.iter().map(of_first).collect(), scenes }
     }
 
-    fn test(
-        &self,
-        column: &MetricColumn,
-        (first, second): (usize, usize),
-        (horizon, confidence): (Option<i64>, f64),
-    ) -> PairTest {
+    fn test(&self, asked: Asked, (first, second): (usize, usize), confidence: f64) -> PairTest {
+        let Asked { column, horizon } = asked;
         let (study, matched) = (self.study, &self.matched[first][second]);
         let (first, second) = (&self.blocks[first], &self.blocks[second]);
         let compared = Compared { study, first, second, matched, horizon, confidence };
@@ -106,19 +109,11 @@ impl<'s, 'a> MatchedBlocks<'s, 'a> {
 
     /// The test of a pair with the better side of its own estimate first. Pairs use the scenes of both models only, so
     /// their difference may point the other way than the models' means.
-    fn better_first(
-        &self,
-        column: &MetricColumn,
-        (first, second): (usize, usize),
-        asked: (Option<i64>, f64),
-    ) -> (PairTest, (usize, usize)) {
-        let found = self.test(column, (first, second), asked);
-        let is_lower = self.study.better(&column.name) == Better::Lower;
-        let is_worse = |difference: f64| if is_lower { difference > 0.0 } else { difference < 0.0 };
-        if found.comparison.difference.is_some_and(is_worse) {
-            return (self.test(column, (second, first), asked), (second, first));
-        }
-        (found, (first, second))
+    fn better_first(&self, asked: Asked, (first, second): (usize, usize)) -> (PairTest, (usize, usize)) {
+        let test = |pair| (self.test(asked, pair, self.study.confidence), pair);
+        let found = test((first, second));
+        let is_worse = self.study.is_worse(&asked.column.name, found.0.comparison.difference);
+        if is_worse { test((second, first)) } else { found }
     }
 
     fn gaps(&self) -> Vec<Gap> {
@@ -153,17 +148,16 @@ fn triangle(count: usize, a: usize, b: usize) -> usize {
     a * (2 * count - a - 1) / 2 + (b - a - 1)
 }
 
-pub(crate) fn compared(study: &Study, confidence: f64) -> (Vec<Family>, Vec<Gap>) {
+pub(crate) fn compared(study: &Study) -> (Vec<Family>, Vec<Gap>) {
     let (mut families, mut gaps) = (Vec::new(), Vec::new());
     for experiment in study.experiments.iter().filter(|experiment| experiment.blocks.len() > 1) {
         let field = MatchedBlocks::of(study, experiment);
         for column in &study.table.metrics {
-            if is_duration(study, &column.name) {
-                // Models are ordered and compared up to one horizon, the one in the table of durations.
-                let horizon = durations::horizon_of(study, experiment, column);
-                families.push(Family::of(experiment.name, column, &field, (horizon, confidence)));
-            } else if study.kind(&column.name) == Kind::Rate {
-                families.push(Family::of(experiment.name, column, &field, (None, confidence)));
+            let is_duration = is_duration(study, &column.name);
+            // Models are ordered and compared up to one horizon, the one in the table of durations.
+            let horizon = is_duration.then(|| durations::horizon_of(study, experiment, column)).flatten();
+            if is_duration || study.is_rate(&column.name) {
+                families.push(Family::of(experiment.name, &field, Asked { column, horizon }));
             }
         }
         gaps.extend(field.gaps());
@@ -176,18 +170,15 @@ impl Family {
         self.tests.iter().map(|test| &test.comparison)
     }
 
-    fn of(experiment: &str, column: &MetricColumn, field: &MatchedBlocks, asked: (Option<i64>, f64)) -> Self {
-        let order = best_first(field, column, asked.0);
-        let mut tests = Vec::new();
-        for (at, &first) in order.iter().enumerate() {
-            tests.extend(order[at + 1..].iter().map(|&second| field.better_first(column, (first, second), asked)));
-        }
-        let (horizon, confidence) = asked;
+    fn of(experiment: &str, field: &MatchedBlocks, asked: Asked) -> Self {
+        let (study, column) = (field.study, asked.column);
+        let order = best_first(field, asked);
+        let mut tests: Vec<_> = couples(&order).map(|(a, b)| field.better_first(asked, (*a, *b))).collect();
         let family = tests.iter_mut().map(|(test, pair)| {
-            let again = |confidence| field.test(column, *pair, (horizon, confidence)).comparison;
+            let again = |confidence| field.test(asked, *pair, confidence).comparison;
             (&mut test.comparison, again)
         });
-        adjust(family, field.study.margin_of(column), confidence);
+        adjust(family, study.margin_of(column), study.confidence);
         let tests: Vec<PairTest> = tests.into_iter().map(|(test, _)| test).collect();
         let models: Vec<String> = order.iter().map(|&at| field.blocks[at].name()).collect();
         let tied = tied_sets(models.len(), |a, b| tests[triangle(models.len(), a, b)].comparison.separated);
@@ -196,7 +187,7 @@ impl Family {
             metric: column.name.clone(),
             tied: tied.into_iter().map(|set| set.into_iter().map(|member| models[member].clone()).collect()).collect(),
             models,
-            detectable: Reach::of(&tests, asked.1),
+            detectable: Reach::of(&tests, study.confidence),
             tests,
         }
     }
@@ -217,13 +208,13 @@ impl Reach {
     }
 }
 
-fn best_first(field: &MatchedBlocks, column: &MetricColumn, horizon: Option<i64>) -> Vec<usize> {
+fn best_first(field: &MatchedBlocks, Asked { column, horizon }: Asked) -> Vec<usize> {
     let mean = |block: &Block| match horizon {
         Some(horizon) => durations::restricted(field.study, block, column, horizon),
         None => field.study.mean(block, column),
     };
     let means: Vec<Option<f64>> = field.blocks.iter().map(mean).collect();
-    let better = field.study.better(&column.name);
+    let better = field.study.metric(&column.name).better;
     let mut order: Vec<usize> = (0..field.blocks.len()).collect();
     // Blocks are ordered by name, and the sort is stable.
     order.sort_by(|&a, &b| by_mean(means[a], means[b], better));

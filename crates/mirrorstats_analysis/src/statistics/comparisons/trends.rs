@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::compare::selection;
+use crate::statistics::comparisons::matching::selection;
 use crate::statistics::rates::chance::Verdict;
 use crate::study::{Block, Study, Unit};
 use mirrorstats_metric::catalogs::catalog::Factor;
@@ -71,7 +71,7 @@ impl TrendRow {
     }
 
     /// The headline rates under every factor with two or more experiments in the table.
-    pub(crate) fn all(study: &Study, headline: &[String], confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, headline: &[String]) -> Vec<Self> {
         let mut rows = Vec::new();
         for (name, factor) in &study.table.catalog.factor {
             let blocks = blocks(study, factor);
@@ -79,7 +79,7 @@ impl TrendRow {
                 let of_model = blocks.values().filter(|blocks| blocks.len() > 1);
                 let mut family: Vec<Self> =
                     of_model.map(|blocks| Self::of(study, (name, factor), blocks, column)).collect();
-                adjust(&mut family, confidence);
+                adjust(&mut family, study.confidence);
                 rows.extend(family);
             }
         }

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{ALL, DesignCheck, DesignFinding, OF_MODELS, Touched};
-use crate::comparable::{BODY_COLOR, Budget, ORIGIN, REPETITION};
+use crate::comparable::{BODY_COLOR, Budget, ORIGIN, PARTICIPANT, REPETITION, SCENE};
 use crate::statistics::comparisons::matching::singular;
 use crate::statistics::rates::durations::{decided, is_duration};
-use crate::statistics::{FEW, Replies};
-use crate::study::{Block, PARTICIPANT, RowKey, SCENE, Study};
+use crate::statistics::{FEW, Replies, span};
+use crate::study::{Block, RowKey, Study, couples};
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_metric::catalogs::catalog::Better;
 use mirrorstats_score::tables::lost_counts::LostCounts;
@@ -31,6 +31,10 @@ pub(super) struct Audit<'s, 'a> {
 
 fn name(block: &Block) -> String {
     block.side.map_or_else(|| block.name(), |side| format!("{} ({side})", block.name()))
+}
+
+fn about(block: &Block) -> String {
+    format!("{} {}", block.experiment, name(block))
 }
 
 /// The rows of each value of a label.
@@ -68,7 +72,7 @@ fn distance<K: Copy + Ord>(one: &BTreeMap<K, f64>, other: &BTreeMap<K, f64>) -> 
 /// The steps of the episodes of a block.
 pub(super) struct Ends {
     /// The episodes without a decision, by their steps.
-    pub unfinished: BTreeMap<i64, u64>,
+    unfinished: BTreeMap<i64, u64>,
     longest: i64,
     episodes: u64,
     /// The last step of an episode: recorded, or where all unfinished episodes end.
@@ -98,6 +102,16 @@ impl Ends {
             Budget::Undeclared => (unfinished.keys().next().filter(|_| unfinished.len() == 1).copied(), false),
         };
         Some(Self { unfinished, longest, episodes, budget, is_recorded })
+    }
+
+    /// The number of episodes without a decision.
+    pub fn undecided(&self) -> u64 {
+        self.unfinished.values().sum()
+    }
+
+    /// The fewest and the most steps of those.
+    pub fn undecided_steps(&self) -> Option<[i64; 2]> {
+        Some([*self.unfinished.keys().next()?, *self.unfinished.keys().next_back()?])
     }
 
     /// True if episodes without a decision end before the budget, or at different steps.
@@ -166,9 +180,8 @@ impl Audit<'_, '_> {
         let others = block.rows().count() - of_people;
         if of_people > 0 && others > 0 {
             let finding = format!(
-                "{} {}: people and programs under one name ({}, and {} without a participant)",
-                block.experiment,
-                name(block),
+                "{}: people and programs under one name ({}, and {} without a participant)",
+                about(block),
                 counted(people.len() as u64, "participant"),
                 counted(others as u64, "episode")
             );
@@ -186,7 +199,7 @@ impl Audit<'_, '_> {
             numbers.sort_unstable();
             Some(numbers)
         };
-        let about = format!("{} {}", block.experiment, name(block));
+        let about = about(block);
         let known: Option<BTreeSet<Vec<i64>>> = scenes.values().map(numbers).collect();
         let is_alike = |found: &BTreeSet<Vec<i64>>| {
             found.len() <= 1
@@ -199,7 +212,9 @@ impl Audit<'_, '_> {
                 format!("{about}: scenes are repeated unequally (repetitions {named}, not the same in each scene)");
             self.find(DesignCheck::Repetitions, &OF_MODELS, finding);
         }
-        let Some(rate) = study.rates().find(|column| study.better(&column.name) == Better::Higher) else { return };
+        let Some(rate) = study.rates().find(|column| study.metric(&column.name).better == Better::Higher) else {
+            return;
+        };
         let values = |rows: &Vec<usize>| -> Vec<i64> {
             let mut rows = rows.clone();
             let repetition = |row: usize| column.and_then(|column| column.get(row)?.parse::<i64>().ok());
@@ -228,9 +243,8 @@ impl Audit<'_, '_> {
         let by_unit = means.iter().sum::<f64>() / means.len() as f64;
         let unit = self.study.unit_name(block);
         let finding = format!(
-            "{} {}: {} to {} per {}, so that {} is {} by episodes and {} by {unit}",
-            block.experiment,
-            name(block),
+            "{}: {} to {} per {}, so that {} is {} by episodes and {} by {unit}",
+            about(block),
             counts.values().min().unwrap_or(&0),
             counted(*counts.values().max().unwrap_or(&0), "episode"),
             singular(unit),
@@ -250,27 +264,22 @@ impl Audit<'_, '_> {
         };
         for (block, ends) in &ends {
             // Silence is below chance without a wrong guess.
-            if ends.episodes >= FEW && ends.unfinished.values().sum::<u64>() == ends.episodes {
-                let all = counted(ends.episodes, "episode");
-                let finding = format!("{} {}: no decision made in {all}", block.experiment, name(block));
+            if ends.episodes >= FEW && ends.undecided() == ends.episodes {
+                let finding = format!("{}: no decision made in {}", about(block), counted(ends.episodes, "episode"));
                 self.find(DesignCheck::Budgets, &[Touched::Levels], finding);
             }
         }
         for (block, ends) in ends.iter().filter(|(_, ends)| ends.is_cut()) {
-            let steps = ends.unfinished.keys().next().zip(ends.unfinished.keys().last());
-            let steps = steps.map_or_else(String::new, |(first, last)| {
-                if first == last { first.to_string() } else { format!("{first} to {last}") }
-            });
-            let unfinished: u64 = ends.unfinished.values().sum();
+            let steps = ends.undecided_steps().map_or_else(String::new, |[first, last]| span(first, last));
             let other = if name(longest) == name(block) {
                 String::new()
             } else {
                 format!(", {} runs to {reach}", name(longest))
             };
             let finding = format!(
-                "{} {}: {unfinished} of {} end undecided after {steps} steps, which is no common budget{other}",
-                block.experiment,
-                name(block),
+                "{}: {} of {} end undecided after {steps} steps, which is no common budget{other}",
+                about(block),
+                ends.undecided(),
                 counted(ends.episodes, "episode")
             );
             self.find(DesignCheck::Budgets, &OF_MODELS, finding);
@@ -294,9 +303,7 @@ impl Audit<'_, '_> {
         touched: Touched,
         check: fn(&Self, [&Block; 2]) -> Option<Difference>,
     ) {
-        let couples =
-            group.iter().enumerate().flat_map(|(at, first)| group[at + 1..].iter().map(move |it| [*first, *it]));
-        let mut found: Vec<_> = couples.filter_map(|couple| check(self, couple)).collect();
+        let mut found: Vec<_> = couples(group).filter_map(|(first, second)| check(self, [first, second])).collect();
         let count = found.len();
         // The first of the most different ones: the sort is stable.
         found.sort_by(|a, b| b.0.total_cmp(&a.0));

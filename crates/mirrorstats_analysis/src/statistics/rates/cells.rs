@@ -10,7 +10,7 @@ use crate::statistics::episodes::Replies;
 use crate::study::{Block, RowKey, Study};
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::number::Decimal;
-use mirrorstats_metric::catalogs::catalog::{Kind, Metric, StandardError};
+use mirrorstats_metric::catalogs::catalog::{Kind, StandardError};
 use mirrorstats_score::cells::interval::{bounded, cell_interval};
 use mirrorstats_score::cells::{Cells, Group, KeyValue};
 use mirrorstats_score::tables::lost_counts::LostCounts;
@@ -110,59 +110,51 @@ impl CellRow {
         })
     }
 
-    pub(crate) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study, cells: &Cells) -> Vec<Self> {
         let mut rows = vec![Vec::new(); cells.groups.len()];
         let members = cells.membership(study.table).expect("the cells are grouped by columns of this table");
         members.into_iter().zip(0..).for_each(|(group, row)| rows[group].push(row));
-        let groups = cells.groups.iter().zip(&rows);
-        groups.flat_map(|(group, rows)| Self::of_group(study, cells, group, rows, confidence)).collect()
+        cells.groups.iter().zip(&rows).flat_map(|(group, rows)| Self::of_group(study, cells, group, rows)).collect()
     }
 
-    fn of_group(study: &Study, cells: &Cells, group: &Group, rows: &[usize], confidence: f64) -> Vec<Self> {
+    fn of_group(study: &Study, cells: &Cells, group: &Group, rows: &[usize]) -> Vec<Self> {
         let has_repeats = study.has_repeats(rows.iter().copied());
         let key: IndexMap<String, KeyValue> = cells.by.iter().cloned().zip(group.key.iter().cloned()).collect();
-        let of_metric = |(metric, moments)| {
-            let moments: &Moments = moments;
-            let metric: &String = metric;
-            let kind = study.kind(metric);
-            let definition = study.metric(metric);
-            let value = |row: usize| study.column(metric)?.get(row);
+        let of_metric = |(name, moments): (&String, &Moments)| {
+            let metric = study.metric(name);
+            let value = |row: usize| study.column(name)?.get(row);
             let units: Option<Vec<Moments>> =
                 has_repeats.then(|| study.units_of(rows.iter().copied(), value).into_values().collect());
             let unit_mean = units.as_deref().and_then(mean);
             let units = units.map(|units| units.len());
-            let intervals = match (definition, kind, moments.counts()) {
-                (_, Kind::Rate, Some(_)) if has_repeats => Intervals::Rate {
+            let confidence = study.confidence;
+            let intervals = match (metric.kind, moments.counts()) {
+                (Kind::Rate, Some(_)) if has_repeats => Intervals::Rate {
                     wilson: unit_mean.zip(units).and_then(|(mean, n)| wilson_of_units(mean, n, confidence)),
                     clopper_pearson: None,
                     jeffreys: None,
                 },
-                (_, Kind::Rate, Some((k, n))) => Intervals::Rate {
+                (Kind::Rate, Some((k, n))) => Intervals::Rate {
                     wilson: wilson(k, n, confidence),
                     clopper_pearson: clopper_pearson(k, n, confidence),
                     jeffreys: jeffreys(k, n, confidence),
                 },
-                (None, ..) => Intervals::withheld(Withheld::Undefined),
-                (Some(_), ..) if has_repeats => Intervals::withheld(Withheld::Dependent),
-                (Some(definition), ..) => Intervals::quantity(study, (metric, definition), moments, rows, confidence),
+                _ => Intervals::quantity(study, name, moments, rows, has_repeats),
             };
+            let name_of_units = || study.name_of_unit(rows.first().copied()).to_owned();
             Self {
                 key: key.clone(),
-                metric: metric.clone(),
-                kind,
+                metric: name.clone(),
+                kind: metric.kind,
                 episodes: group.episodes,
                 n: moments.n,
-                sum: definition.map_or_else(|| Decimal::of_units(moments.sum, 0), |metric| metric.sums(moments)[0]),
-                mean: definition.map_or_else(|| moments.mean(), |metric| metric.mean(moments)),
-                se: definition.and_then(|metric| metric.standard_error(moments)),
-                units: units.map(|n| Units {
-                    n: n as u64,
-                    name: study.name_of_unit(rows.first().copied()).to_owned(),
-                    too_few: false,
-                }),
-                unit_mean: unit_mean.zip(definition).map(|(mean, metric)| metric.in_unit(mean)),
+                sum: metric.sums(moments)[0],
+                mean: metric.mean(moments),
+                se: metric.standard_error(moments),
+                units: units.map(|n| Units { n: n as u64, name: name_of_units(), too_few: false }),
+                unit_mean: unit_mean.map(|mean| metric.in_unit(mean)),
                 intervals,
-                few: moments.n < FEW && definition.is_some_and(|definition| definition.when.is_some()),
+                few: moments.n < FEW && metric.when.is_some(),
                 lost: None,
                 unusable_replies: None,
             }
@@ -172,23 +164,13 @@ impl CellRow {
 }
 
 impl Intervals {
-    const fn withheld(why: Withheld) -> Self {
-        Self::Quantity {
-            student_t: None,
-            student_t_withheld: Some(why),
-            bootstrap: None,
-            bootstrap_withheld: Some(why),
+    fn quantity(study: &Study, name: &str, moments: &Moments, rows: &[usize], has_repeats: bool) -> Self {
+        if has_repeats {
+            let withheld = Some(Withheld::Dependent);
+            let (student_t_withheld, bootstrap_withheld) = (withheld, withheld);
+            return Self::Quantity { student_t: None, student_t_withheld, bootstrap: None, bootstrap_withheld };
         }
-    }
-
-    fn quantity(
-        study: &Study,
-        (name, metric): (&str, &Metric),
-        moments: &Moments,
-        rows: &[usize],
-        confidence: f64,
-    ) -> Self {
-        let range = study.range(name);
+        let (metric, range, confidence) = (study.metric(name), study.range(name), study.confidence);
         // 10,000 resamples are drawn only if their interval may be shown.
         let resampled = (moments.n >= coverage::BOOTSTRAP && moments.has_spread())
             .then(|| {
@@ -225,27 +207,27 @@ pub struct ClusterRow {
 }
 
 impl ClusterRow {
-    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study) -> Vec<Self> {
         if study.design.clusters() != Some(Cluster::Seed) {
             return Vec::new();
         }
-        let of_block = |block| study.table.metrics.iter().map(move |column| Self::of(study, block, column, confidence));
+        let of_block = |block| study.table.metrics.iter().map(move |column| Self::of(study, block, column));
         study.blocks().flat_map(of_block).collect()
     }
 
-    fn of(study: &Study, block: &Block, column: &MetricColumn, confidence: f64) -> Self {
+    fn of(study: &Study, block: &Block, column: &MetricColumn) -> Self {
         // The units are seeds, as declared.
         let seeds: Vec<Moments> = study.by_unit(block, |row| column.get(row)).into_values().collect();
         let whole = block.moments(column);
-        let found = match study.kind(&column.name) {
-            Kind::Rate => clustered_rate(&seeds, confidence),
-            Kind::Quantity => clustered(&seeds, confidence),
+        let metric = study.metric(&column.name);
+        let found = match metric.kind {
+            Kind::Rate => clustered_rate(&seeds, study.confidence),
+            Kind::Quantity => clustered(&seeds, study.confidence),
         };
         let range = study.range(&column.name);
         let interval = found.and_then(|found| found.interval).map(|interval| interval.within(range.low, range.high));
         let (interval, withheld) =
             coverage::given(interval, seeds.len() as u64, coverage::CLUSTERS, found.is_some_and(|it| it.se > 0.0));
-        let metric = &study.table.catalog.metric[&column.name];
         let interval = interval.map(|interval| in_unit(interval, metric));
         Self {
             key: block.key(),

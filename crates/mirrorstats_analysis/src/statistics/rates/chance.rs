@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward, settle};
 use crate::statistics::comparisons::matching::{Units, too_few};
 use crate::study::{Block, Experiment, RowKey, Study};
+use mirrorstats_exact::chance::with_strategy;
 use mirrorstats_exact::moments::Moments;
 use mirrorstats_exact::ratio::Ratio;
 use mirrorstats_score::tables::table::MetricColumn;
@@ -67,14 +68,7 @@ pub enum Role {
     Reference,
 }
 
-impl Role {
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Chance => "chance",
-            Self::Reference => "reference",
-        }
-    }
-}
+mirrorstats_exact::names!(Role { Chance: "chance", Reference: "reference" });
 
 /// The position of a rate relative to a level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -89,60 +83,41 @@ pub enum Verdict {
 }
 
 impl ChanceRow {
-    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study) -> Vec<Self> {
         let mut rows = Vec::new();
         for experiment in &study.experiments {
             for column in study.rates() {
                 for level in levels(study, experiment.name, &column.name) {
-                    rows.extend(Self::family(study, experiment, column, &level, confidence));
+                    rows.extend(Self::family(study, experiment, column, &level));
                 }
             }
         }
         rows
     }
 
-    fn family(
-        study: &Study,
-        experiment: &Experiment,
-        column: &MetricColumn,
-        level: &Level,
-        confidence: f64,
-    ) -> Vec<Self> {
-        let chance = level.rate;
-        let of = |block: &Block| Self::of(study, block, column, level, confidence);
+    fn family(study: &Study, experiment: &Experiment, column: &MetricColumn, level: &Level) -> Vec<Self> {
+        let of = |block: &Block| Self::of(study, block, column, level);
         let (seen, mut rows): (Vec<LossCase>, Vec<Self>) = experiment.blocks.iter().filter_map(of).unzip();
-        let settled = settle(seen.into_iter().zip(rows.iter_mut().map(|row| &mut row.losses)), confidence);
+        let settled = settle(seen.into_iter().zip(rows.iter_mut().map(|row| &mut row.losses)), study.confidence);
         for (row, (p_adjusted, is_shown)) in rows.iter_mut().zip(settled) {
-            let units = row.units.as_ref().map(|units| units.too_few);
-            let too_few = units.unwrap_or_else(|| few_episodes(row.n, chance, confidence));
             row.p_adjusted = p_adjusted;
-            let order = row.estimate().total_cmp(&chance.value());
-            row.verdict = Verdict::by_order(order, is_shown && !too_few);
+            let order = row.estimate().total_cmp(&row.level.value());
+            row.verdict = Verdict::by_order(order, is_shown && !row.counted(study.confidence).too_few);
         }
         rows
     }
 
     /// One rate of one block, before adjustment.
-    fn of(
-        study: &Study,
-        block: &Block,
-        column: &MetricColumn,
-        level: &Level,
-        confidence: f64,
-    ) -> Option<(LossCase, Self)> {
+    fn of(study: &Study, block: &Block, column: &MetricColumn, level: &Level) -> Option<(LossCase, Self)> {
         let chance = level.rate;
         let (successes, n) = block.moments(column).counts()?;
         let of_units: Option<Vec<Moments>> =
             block.repeats.then(|| study.by_unit(block, |row| column.get(row)).into_values().collect());
-        let with_lost = |toward| Toward::assumed(toward, block, column, true);
         let tested = |toward: Option<Toward>| {
             let Some(units) = &of_units else {
-                let (successes, n) = with_lost(toward).counts()?;
-                return Some((
-                    with_lost(toward).mean().unwrap_or(0.0),
-                    exact_test(successes, n, chance)?,
-                    least_p(n, chance)?,
-                ));
+                let moments = Toward::assumed(toward, block, column, true);
+                let (successes, n) = moments.counts()?;
+                return Some((moments.mean().unwrap_or(0.0), exact_test(successes, n, chance)?, least_p(n, chance)?));
             };
             let lost = toward.map_or_else(Vec::new, |toward| toward.units(block.lost));
             let units: Vec<Moments> = units.iter().copied().chain(lost.into_iter().map(|(one, _)| one)).collect();
@@ -155,6 +130,7 @@ impl ChanceRow {
             LossCase { difference, p: found.map(|(_, test, _)| test.p) }
         };
         let (estimate, test, least) = tested(None)?;
+        let units = of_units.as_ref().map(|units| Units::new(study, block, units.len(), least));
         let row = Self {
             key: block.key(),
             metric: column.name.clone(),
@@ -163,12 +139,12 @@ impl ChanceRow {
             strategy: level.strategy.clone(),
             successes,
             n,
-            unit_mean: of_units.as_ref().map(|_| estimate),
+            unit_mean: units.as_ref().map(|_| estimate),
             p: test.p,
             mid_p: test.mid_p,
             p_adjusted: test.p,
             verdict: Verdict::NotSeparated,
-            units: of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence)),
+            units,
             losses: LossCases::of(block.lost, |toward| case(Some(toward))),
         };
         Some((case(None), row))
@@ -179,11 +155,25 @@ impl ChanceRow {
         self.unit_mean.unwrap_or(self.successes as f64 / self.n as f64)
     }
 
+    /// `chance (1/3)`, `the reference (0.5)`.
+    pub fn against(&self) -> String {
+        let role = if self.role == Role::Chance { "chance" } else { "the reference" };
+        format!("{role} ({})", with_strategy(self.level, self.strategy.as_deref()))
+    }
+
+    /// The units of the test: scenes, seeds or participants, else episodes.
+    fn counted(&self, confidence: f64) -> Units {
+        self.units.clone().unwrap_or_else(|| {
+            let least = least_p(self.n, self.level);
+            let n = usize::try_from(self.n).unwrap_or(usize::MAX);
+            let too_few = least.is_none_or(|least| too_few(n, least, confidence));
+            Units { n: self.n, name: "episodes".to_owned(), too_few }
+        })
+    }
+
     /// The units or episodes that are too few for a verdict, or the lost ones that decide it; otherwise `None`.
     pub(crate) fn unsaid(&self, confidence: f64) -> Option<Units> {
-        let episodes =
-            || Units { n: self.n, name: "episodes".to_owned(), too_few: few_episodes(self.n, self.level, confidence) };
-        let units = self.units.clone().unwrap_or_else(episodes);
+        let units = self.counted(confidence);
         units.too_few.then_some(units).or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
 
@@ -192,8 +182,7 @@ impl ChanceRow {
     pub(crate) fn reach(family: &[&Self], confidence: f64) -> Option<f64> {
         let first_step = level(confidence)? / family.len() as f64;
         let said = family.iter().filter(|row| row.unsaid(confidence).is_none());
-        let (n, chance) =
-            said.map(|row| (row.units.as_ref().map_or(row.n, |units| units.n), row.level)).min_by_key(|it| it.0)?;
+        let (n, chance) = said.map(|row| (row.counted(confidence).n, row.level)).min_by_key(|it| it.0)?;
         let power = |above| OneRate { level: first_step, chance, rate: chance.value() + above }.power(n);
         Some(chance.value() + smallest(POWER, 1.0 - chance.value(), power)?)
     }
@@ -201,27 +190,16 @@ impl ChanceRow {
     /// The largest number of units or episodes, if no outcome of these models could pass Holm's first step.
     pub(crate) fn hopeless(family: &[&Self], confidence: f64) -> Option<Units> {
         let first_step = level(confidence)? / family.len() as f64;
-        let counted =
-            |row: &Self| row.units.clone().unwrap_or(Units { n: row.n, name: "episodes".to_owned(), too_few: true });
-        let is_hopeless = |row: &&Self| least_p(counted(row).n, row.level).is_none_or(|least| least > first_step);
-        let most = family.iter().map(|row| counted(row)).max_by_key(|units| units.n)?;
+        let is_hopeless =
+            |row: &&Self| least_p(row.counted(confidence).n, row.level).is_none_or(|least| least > first_step);
+        let most = family.iter().map(|row| row.counted(confidence)).max_by_key(|units| units.n)?;
         family.iter().all(is_hopeless).then_some(most)
     }
 }
 
-fn few_episodes(n: u64, level: Ratio, confidence: f64) -> bool {
-    least_p(n, level).is_none_or(|least| too_few(usize::try_from(n).unwrap_or(usize::MAX), least, confidence))
-}
+mirrorstats_exact::names!(Verdict { Above: "above", Below: "below", NotSeparated: "not told apart" });
 
 impl Verdict {
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Above => "above",
-            Self::Below => "below",
-            Self::NotSeparated => "not told apart",
-        }
-    }
-
     pub(crate) fn by_order(order: Ordering, is_shown: bool) -> Self {
         match order {
             Ordering::Greater if is_shown => Self::Above,

@@ -93,21 +93,21 @@ fn curve(study: &Study, block: &Block, column: &MetricColumn) -> Option<Survival
 
 impl DurationRow {
     /// Every censored duration of the table, up to the last step at which every model's curve is known.
-    pub(crate) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+    pub(crate) fn all(study: &Study) -> Vec<Self> {
         let durations = study.relations.durations.iter().filter(|(duration, _)| is_duration(study, duration));
         let columns: Vec<&MetricColumn> = durations.filter_map(|(duration, _)| study.column(duration)).collect();
         let mut rows = Vec::new();
         for column in columns {
             for experiment in &study.experiments {
                 let horizon = horizon_of(study, experiment, column);
-                let of = |block| Self::of(study, block, column, horizon, confidence);
-                rows.extend(experiment.blocks.iter().map(of));
+                rows.extend(experiment.blocks.iter().map(|block| Self::of(study, block, column, horizon)));
             }
         }
         rows
     }
 
-    fn of(study: &Study, block: &Block, column: &MetricColumn, horizon: Option<i64>, confidence: f64) -> Self {
+    fn of(study: &Study, block: &Block, column: &MetricColumn, horizon: Option<i64>) -> Self {
+        let confidence = study.confidence;
         let endings: Vec<Ending> = block.rows().filter_map(|row| ending(study, column, row)).collect();
         let finished = endings.iter().filter(|ending| ending.outcome != Outcome::Unfinished).count() as u64;
         let n = endings.len() as u64;

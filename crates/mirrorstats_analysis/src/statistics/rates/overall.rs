@@ -8,13 +8,11 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::compare::selection;
 use crate::statistics::comparisons::losses::{LossCase, LossCases, Toward, settle};
-use crate::statistics::comparisons::matching::{Matched, Scenes, Sides, outcomes};
+use crate::statistics::comparisons::matching::{Matched, Scenes, Sides, outcomes, selection};
 use crate::statistics::comparisons::models::{Family, PairTest};
 use crate::statistics::rates::durations::{decided, is_duration};
 use crate::study::{Block, Study};
-use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_score::tables::table::MetricColumn;
 use mirrorstats_statistics::comparisons::holm::{is_significant, level};
 use mirrorstats_statistics::comparisons::improvement::{Improvement, probability_of_improvement};
@@ -126,7 +124,8 @@ impl<'s, 'a> Couple<'s, 'a> {
         self.strata.iter().map(|(block, _)| block.experiment.to_owned()).collect()
     }
 
-    fn rate(&self, study: &Study, column: &MetricColumn, confidence: f64) -> OverallRow {
+    fn rate(&self, study: &Study, column: &MetricColumn) -> OverallRow {
+        let confidence = study.confidence;
         let is_selected = self.strata.iter().any(|(a, b)| selection(study, column, [a, b]).is_some());
         let sides = Sides::of(study, column, &self.strata);
         let of = |toward: Option<Toward>| {
@@ -184,7 +183,7 @@ impl<'s, 'a> Couple<'s, 'a> {
         )
     }
 
-    fn improvement(&self, study: &Study, column: &MetricColumn, confidence: f64) -> Option<ImprovementRow> {
+    fn improvement(&self, study: &Study, column: &MetricColumn) -> Option<ImprovementRow> {
         // The statistic favours larger values, but earlier decisions are better: so the sides are swapped.
         let steps = |block: &Block| -> Vec<i64> {
             let endings = block.rows().filter_map(|row| decided(study, column, row));
@@ -197,29 +196,27 @@ impl<'s, 'a> Couple<'s, 'a> {
             first: self.first.clone(),
             second: self.second.clone(),
             experiments: self.experiments(),
-            improvement: probability_of_improvement(&strata, confidence)?,
+            improvement: probability_of_improvement(&strata, study.confidence)?,
         })
     }
 }
 
-pub(crate) fn rates(study: &Study, families: &[Family], metrics: &[String], confidence: f64) -> Vec<OverallRow> {
+pub(crate) fn rates(study: &Study, families: &[Family], metrics: &[String]) -> Vec<OverallRow> {
     let couples = Couple::all(study);
-    let is_rate = |metric: &&String| study.kind(metric) == Kind::Rate;
-    let mut all = Vec::new();
-    for column in metrics.iter().filter(is_rate).filter_map(|metric| study.column(metric)) {
-        let mut rows: Vec<OverallRow> = couples.iter().map(|it| it.rate(study, column, confidence)).collect();
-        adjust(&mut rows, confidence);
-        all.extend(rows.into_iter().map(|row| row.better_first(study).within(families, confidence)));
-    }
-    all
+    let columns = metrics.iter().filter_map(|metric| study.column(metric));
+    let of_rate = |column: &MetricColumn| {
+        let mut rows: Vec<OverallRow> = couples.iter().map(|couple| couple.rate(study, column)).collect();
+        adjust(&mut rows, study.confidence);
+        rows.into_iter().map(|row| row.better_first(study).within(families, study.confidence)).collect::<Vec<_>>()
+    };
+    columns.filter(|column| study.is_rate(&column.name)).flat_map(of_rate).collect()
 }
 
-pub(crate) fn improvements(study: &Study, metrics: &[String], confidence: f64) -> Vec<ImprovementRow> {
+pub(crate) fn improvements(study: &Study, metrics: &[String]) -> Vec<ImprovementRow> {
     let couples = Couple::all(study);
-    let durations = metrics.iter().filter(|metric| is_duration(study, metric));
-    let columns: Vec<&MetricColumn> = durations.filter_map(|metric| study.column(metric)).collect();
-    let of = |column| couples.iter().filter_map(move |couple| couple.improvement(study, column, confidence));
-    columns.into_iter().flat_map(of).collect()
+    let columns = metrics.iter().filter_map(|metric| study.column(metric));
+    let durations = columns.filter(|column| is_duration(study, &column.name));
+    durations.flat_map(|column| couples.iter().filter_map(move |couple| couple.improvement(study, column))).collect()
 }
 
 fn adjust(rows: &mut [OverallRow], confidence: f64) {
@@ -258,9 +255,7 @@ impl OverallRow {
     }
 
     fn better_first(self, study: &Study) -> Self {
-        let lower_is_better = study.better(&self.metric) == mirrorstats_metric::catalogs::catalog::Better::Lower;
-        let is_worse = |difference: f64| if lower_is_better { difference > 0.0 } else { difference < 0.0 };
-        if !self.difference.is_some_and(is_worse) {
+        if !study.is_worse(&self.metric, self.difference) {
             return self;
         }
         Self {

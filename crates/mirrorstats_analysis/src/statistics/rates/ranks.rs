@@ -18,8 +18,6 @@ use crate::study::{Block, Study};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{UNDEFINED, fixed};
 use mirrorstats_exact::moments::MomentOverflow;
-use mirrorstats_metric::catalogs::catalog::Kind;
-use mirrorstats_score::cells::interval::CONFIDENCE;
 use mirrorstats_score::tables::lost_counts::LostCounts;
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
 use mirrorstats_statistics::design::Design;
@@ -97,8 +95,8 @@ impl Ranks {
     ) -> Result<Self, MomentOverflow> {
         let mut study = Study::from_table(table, design, Some(lost), None)?;
         study.pool = pool;
-        let (families, _) = compared(&study, CONFIDENCE);
-        let overall = overall::rates(&study, &families, &headline(&study), CONFIDENCE);
+        let (families, _) = compared(&study);
+        let overall = overall::rates(&study, &families, &headline(&study));
         Ok(Self(RankRow::all(&families, &overall)))
     }
 
@@ -106,7 +104,7 @@ impl Ranks {
     pub fn unit_means(table: &EpisodeTable, design: Design) -> Result<Option<String>, MomentOverflow> {
         let study = Study::from_table(table, design, None, None)?;
         let columns: Vec<&MetricColumn> = headline(&study).iter().filter_map(|metric| study.column(metric)).collect();
-        let rates = || columns.iter().filter(|column| study.kind(&column.name) == Kind::Rate);
+        let rates = || columns.iter().filter(|column| study.is_rate(&column.name));
         let of_block = |block: &Block| {
             let unit = singular(study.unit_name(block));
             let name = format!("{} {}", block.experiment, block.name());

@@ -8,17 +8,16 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::statistics::comparisons::compare::selection;
+use crate::statistics::comparisons::matching::selection;
 use crate::statistics::comparisons::models::by_mean;
 use crate::statistics::conclusions::headline;
 use crate::statistics::design_audit::{DesignAudit, Touched};
 use crate::statistics::episodes::Selection;
 use crate::statistics::options::Options;
 use crate::statistics::rates::chance::{Level, Role, Verdict, levels};
-use crate::study::{Block, Experiment, RowKey, Study, Unit};
+use crate::study::{Block, Experiment, RowKey, Study, Unit, couples};
 use mirrorstats_exact::moments::{MomentOverflow, Moments};
 use mirrorstats_exact::ratio::Ratio;
-use mirrorstats_metric::catalogs::catalog::Kind;
 use mirrorstats_score::tables::table::{EpisodeTable, MetricColumn};
 use mirrorstats_statistics::comparisons::holm::{holm, is_significant};
 use mirrorstats_statistics::comparisons::paired::Pairs;
@@ -143,8 +142,8 @@ impl Sequential {
     /// undefined.
     pub fn from_table(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
         let mut study = Study::from_table(table, options.design, None, None)?;
-        study.pool = options.pooled.is_some();
-        let rates = SequentialRate::all(&study, options.confidence);
+        (study.confidence, study.pool) = (options.confidence, options.pooled.is_some());
+        let rates = SequentialRate::all(&study);
         let audit = DesignAudit::of(&study, options);
         let pooled = options.pooled_in(&study);
         let mut caveats = audit.caveats(Touched::Levels, options, !pooled.is_empty());
@@ -162,8 +161,8 @@ impl Sequential {
             audit,
             caveats,
             headline: headline_rates(&study),
-            chance: SequentialChance::all(&study, &rates, options.confidence),
-            models: SequentialPair::all(&study, options.confidence),
+            chance: SequentialChance::all(&study, &rates),
+            models: SequentialPair::all(&study),
             rates,
         })
     }
@@ -171,31 +170,32 @@ impl Sequential {
 
 fn not_comparable(study: &Study) -> BTreeMap<String, usize> {
     let mut found = BTreeMap::new();
-    for experiment in &study.experiments {
-        for (at, first) in experiment.blocks.iter().enumerate() {
-            let settings = experiment.blocks[at + 1..].iter().filter_map(|second| study.incomparable(first, second));
-            settings.for_each(|setting| *found.entry(setting).or_default() += 1);
+    for (first, second) in study.experiments.iter().flat_map(|experiment| couples(&experiment.blocks)) {
+        if let Some(setting) = study.incomparable(first, second) {
+            *found.entry(setting).or_default() += 1;
         }
     }
     found
 }
 
 fn headline_rates(study: &Study) -> Vec<String> {
-    let chosen: Vec<String> = headline(study).into_iter().filter(|metric| study.kind(metric) == Kind::Rate).collect();
+    let chosen: Vec<String> = headline(study).into_iter().filter(|metric| study.is_rate(metric)).collect();
     if chosen.is_empty() { study.rates().take(1).map(|column| column.name.clone()).collect() } else { chosen }
 }
 
 impl SequentialRate {
     /// The rates with values 0 or 1 in every episode, by experiment, then by metric and model.
-    fn all(study: &Study, confidence: f64) -> Vec<Self> {
-        let of_experiment = |experiment: &Experiment| -> Vec<Self> {
-            let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
-            each.filter_map(|(column, block)| Self::of(study, block, column, confidence)).collect()
-        };
-        study.experiments.iter().flat_map(of_experiment).collect()
+    fn all(study: &Study) -> Vec<Self> {
+        let mut rows = Vec::new();
+        for experiment in &study.experiments {
+            for column in study.rates() {
+                rows.extend(experiment.blocks.iter().filter_map(|block| Self::of(study, block, column)));
+            }
+        }
+        rows
     }
 
-    fn of(study: &Study, block: &Block, column: &MetricColumn, confidence: f64) -> Option<Self> {
+    fn of(study: &Study, block: &Block, column: &MetricColumn) -> Option<Self> {
         let mut firsts = study.firsts(block, column).into_iter();
         let moments = firsts.try_fold(Moments::default(), |sum, (_, value)| sum.with(value)).ok()?;
         let (successes, n) = moments.counts()?;
@@ -205,18 +205,18 @@ impl SequentialRate {
             successes,
             n,
             rate: moments.mean(),
-            interval: confidence_sequence(successes, n, confidence),
+            interval: confidence_sequence(successes, n, study.confidence),
         })
     }
 }
 
 impl SequentialChance {
-    fn all(study: &Study, rates: &[SequentialRate], confidence: f64) -> Vec<Self> {
+    fn all(study: &Study, rates: &[SequentialRate]) -> Vec<Self> {
         let is_same =
             |a: &SequentialRate, b: &SequentialRate| a.key.experiment == b.key.experiment && a.metric == b.metric;
         let families = rates.chunk_by(is_same).flat_map(|rates| {
             let levels = levels(study, &rates[0].key.experiment, &rates[0].metric);
-            levels.into_iter().map(move |level| Self::family(rates, &level, confidence))
+            levels.into_iter().map(move |level| Self::family(rates, &level, study.confidence))
         });
         families.flatten().collect()
     }
@@ -247,12 +247,12 @@ impl SequentialChance {
 }
 
 impl SequentialPair {
-    fn all(study: &Study, confidence: f64) -> Vec<Self> {
+    fn all(study: &Study) -> Vec<Self> {
         let families = study.experiments.iter().flat_map(|experiment| study.rates().map(move |it| (experiment, it)));
-        families.flat_map(|(experiment, column)| Self::family(study, experiment, column, confidence)).collect()
+        families.flat_map(|(experiment, column)| Self::family(study, experiment, column)).collect()
     }
 
-    fn family(study: &Study, experiment: &Experiment, column: &MetricColumn, confidence: f64) -> Vec<Self> {
+    fn family(study: &Study, experiment: &Experiment, column: &MetricColumn) -> Vec<Self> {
         let mut blocks: Vec<&Block> = experiment.blocks.iter().collect();
         // The same episodes as the pairs: the first of each unit.
         let mean = |block: &Block| {
@@ -260,16 +260,14 @@ impl SequentialPair {
             let sum: i64 = firsts.iter().map(|(_, value)| *value).sum();
             (!firsts.is_empty()).then(|| sum as f64 / firsts.len() as f64)
         };
-        blocks.sort_by(|a, b| by_mean(mean(a), mean(b), study.better(&column.name)));
+        blocks.sort_by(|a, b| by_mean(mean(a), mean(b), study.metric(&column.name).better));
         let firsts: Vec<_> = blocks.iter().map(|block| (*block, study.firsts(block, column))).collect();
         let mut tested = Vec::new();
-        for (at, (first, here)) in firsts.iter().enumerate() {
-            for (second, there) in &firsts[at + 1..] {
-                let is_selected = selection(study, column, [first, second]).is_some();
-                if !is_selected && study.incomparable(first, second).is_none() {
-                    let (pairs, shared) = matched(here, there);
-                    tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
-                }
+        for ((first, here), (second, there)) in couples(&firsts) {
+            let is_selected = selection(study, column, [first, second]).is_some();
+            if !is_selected && study.incomparable(first, second).is_none() {
+                let (pairs, shared) = matched(here, there);
+                tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
             }
         }
         let adjusted = holm(&tested.iter().map(|(.., found)| found.p).collect::<Vec<_>>());
@@ -285,7 +283,7 @@ impl SequentialPair {
             p_adjusted,
             verdict: Verdict::by_order(
                 pairs.first_only.cmp(&pairs.second_only),
-                is_significant(p_adjusted, confidence),
+                is_significant(p_adjusted, study.confidence),
             ),
         });
         rows.collect()

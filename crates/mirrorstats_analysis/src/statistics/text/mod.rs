@@ -9,7 +9,7 @@ mod text_table;
 
 pub(crate) use self::tables::beside;
 
-use super::{Answer, DesignAudit, FEW, Family, Selection, Statistics};
+use super::{Answer, DesignAudit, FEW, Selection, Statistics};
 use mirrorstats_exact::escape::visible;
 use mirrorstats_exact::format::{counted, fixed};
 use mirrorstats_tables::{Table, push_wrapped};
@@ -36,11 +36,11 @@ impl Statistics {
     pub fn render(&self, metrics: &[String], length: Length, width: Option<usize>) -> String {
         let statistics = self;
         let shown = |metric: &str| metrics.iter().any(|name| name == metric);
-        let percent = percent(statistics.confidence);
         let mut text = format!(
-            "{}, definitions {}, {percent} confidence\n",
+            "{}, definitions {}, {} confidence\n",
             counted(statistics.episodes as u64, "episode"),
-            visible(&statistics.definitions)
+            visible(&statistics.definitions),
+            percent(statistics.confidence)
         );
         episodes(&mut text, statistics.selection.as_ref(), &statistics.pooled, width);
         push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
@@ -59,10 +59,7 @@ impl Statistics {
         let count = if length == Length::Screen { 1 } else { usize::MAX };
         tied.take(count).for_each(|table| section(&mut text, table, width));
         list(&mut text, "What cannot be concluded", &warnings, width);
-        let tables = if length == Length::Screen { Vec::new() } else { sections(statistics, &shown, length, &percent) };
-        for (title, table) in tables {
-            section(&mut text, table.titled(title), width);
-        }
+        sections(statistics, &shown, length).into_iter().for_each(|table| section(&mut text, table, width));
         let more = match length {
             Length::Screen => "--tables prints the numbers behind the answers; --full also every row and interval.",
             Length::Tables => {
@@ -144,58 +141,31 @@ fn heading(statistics: &Statistics) -> String {
     format!("Answers, after Holm's adjustment{of}")
 }
 
-fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, percent: &str) -> Vec<(String, Table)> {
-    let is_full = length == Length::Full;
-    let mut sections = Vec::new();
-    let mut add = |title: String, table: Table| sections.push((title, table));
-    let title = if is_full { "intervals" } else { "score intervals (Wilson)" };
-    add(format!("Rates, {percent} {title}"), tables::rates(statistics, shown, is_full));
-    let mid_p = if is_full { "; mid-p need not keep the level" } else { "" };
-    let title = "Against chance: exact binomial test, two-sided by minimum likelihood; Holm over the models";
-    add(format!("{title}{mid_p}"), tables::chance(statistics, shown, is_full));
-    let is_permuted = statistics.models.iter().flat_map(Family::comparisons).any(|found| found.p_error.is_some());
-    let by_permutation = if is_permuted { ", also by permutation at unequal n" } else { "" };
-    let title = format!(
-        "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
-         episodes), t tests of restricted means{by_permutation}; Holm over all pairs; {percent} intervals (Newcombe) not \
-         adjusted"
-    );
-    add(title, tables::separated(statistics, shown, is_full));
-    let title = format!(
-        "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
-         {percent} interval, McNemar's over the pairs of all, or permutation by scene or cluster; two-sided by minimum \
-         likelihood; Holm over all pairs"
-    );
-    add(title, tables::overall(statistics, shown, is_full));
-    let title = format!(
-        "Between conditions: first experiment minus the other, by the same methods; Holm over the models; {percent} \
-         intervals not adjusted"
-    );
-    add(title, tables::conditions(statistics, shown, is_full));
-    let title = "Rates against a dose: Cochran-Armitage test within each scene or other unit (Mantel 1963); Holm over the models";
-    add(title.to_owned(), tables::trends(statistics, shown));
-    let title = format!(
-        "Durations: unfinished episodes censored (Kaplan-Meier); medians by Brookmeyer and Crowley, restricted means on \
-         the log-odds scale, {percent} intervals"
-    );
-    add(title, tables::durations(statistics, shown));
-    let title = "The same scene played again: verdicts that differ by chance alone, which a difference has to exceed";
-    add(title.to_owned(), tables::retests(statistics, shown));
-    add("Lost to infrastructure".to_owned(), tables::losses(statistics, shown));
-    if !is_full {
-        return sections;
+/// The numbers behind the answers; empty tables are not printed.
+fn sections(statistics: &Statistics, shown: tables::Shown, length: Length) -> Vec<Table> {
+    if length == Length::Screen {
+        return Vec::new();
     }
-    let title = format!(
-        "How often one model decides earlier than another, averaged over experiments; who never decides is the latest; \
-         stratified bootstrap, {percent} percentile intervals"
-    );
-    add(title, tables::improvements(statistics, shown));
-    let title = format!("Time to a correct decision: a wrong one competes (Aalen-Johansen); {percent} intervals");
-    add(title, tables::correct(statistics, shown));
-    let title = format!("Quantities, {percent} intervals of the plain mean: Student's t, seeded BCa bootstrap");
-    add(title, tables::quantities(statistics, shown));
-    let title = "By seed: cluster-robust standard errors, t(seeds - 1), of rates on the log-odds scale";
-    add(title.to_owned(), tables::clusters(statistics, shown));
+    let is_full = length == Length::Full;
+    let mut sections = vec![
+        tables::rates(statistics, shown, is_full),
+        tables::chance(statistics, shown, is_full),
+        tables::separated(statistics, shown, is_full),
+        tables::overall(statistics, shown, is_full),
+        tables::conditions(statistics, shown, is_full),
+        tables::trends(statistics, shown),
+        tables::durations(statistics, shown),
+        tables::retests(statistics, shown),
+        tables::losses(statistics, shown),
+    ];
+    if is_full {
+        sections.extend([
+            tables::improvements(statistics, shown),
+            tables::correct(statistics, shown),
+            tables::quantities(statistics, shown),
+            tables::clusters(statistics, shown),
+        ]);
+    }
     sections
 }
 

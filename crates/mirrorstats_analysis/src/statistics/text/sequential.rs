@@ -38,15 +38,8 @@ impl Sequential {
         list(&mut text, "What every verdict leaves out", &sequential.caveats, width);
         list(&mut text, "What this is for", &PURPOSE.map(str::to_owned), width);
         let pairs: Vec<&SequentialPair> = sequential.models.iter().filter(|pair| shown(&pair.metric)).collect();
-        for (title, table) in [
-            (&*format!("Rates, {percent} confidence sequences"), rates(sequential, &shown)),
-            ("Against chance: e-values, Holm over the models", chance(sequential, &shown)),
-            (
-                "Models told apart: e-values of discordant pairs, Holm over all pairs of an experiment",
-                separated(&pairs),
-            ),
-        ] {
-            section(&mut text, table.titled(title), width);
+        for table in [rates(sequential, &shown), chance(sequential, &shown), separated(&pairs)] {
+            section(&mut text, table, width);
         }
         let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated).count();
         let apart = sequential.not_comparable.iter();
@@ -86,6 +79,7 @@ fn rates(sequential: &Sequential, shown: Shown) -> Table {
         .number("rate", |row| fixed(row.rate, 3))
         .number("sequence", |row| plain(row.interval, 3))
         .table()
+        .titled(format!("Rates, {} confidence sequences", percent(sequential.confidence)))
 }
 
 fn chance(sequential: &Sequential, shown: Shown) -> Table {
@@ -97,6 +91,7 @@ fn chance(sequential: &Sequential, shown: Shown) -> Table {
         .p_values(false, |row| [Some(row.p), None, Some(row.p_adjusted)])
         .number("verdict", |row| row.verdict.name())
         .table()
+        .titled("Against chance: e-values, Holm over the models")
 }
 
 fn separated(pairs: &[&SequentialPair]) -> Table {
@@ -112,4 +107,5 @@ fn separated(pairs: &[&SequentialPair]) -> Table {
         .number("e", |pair| e_value(pair.e))
         .p_values(false, |pair| [Some(pair.p), None, Some(pair.p_adjusted)])
         .table()
+        .titled("Models told apart: e-values of discordant pairs, Holm over all pairs of an experiment")
 }

@@ -2,12 +2,13 @@
 
 use indexmap::{IndexMap, IndexSet};
 
+use super::percent;
 use super::text_table::TextTable;
 use crate::statistics::comparisons::matching::singular;
 use crate::statistics::rates::ranks::ALL;
 use crate::statistics::{
-    CellRow, ChanceRow, Comparison, DesignAudit, Dose, Intervals, LossCases, Method, OverallMethod, RankRow, Sign,
-    Statistics, Units, Verdict,
+    CellRow, ChanceRow, Comparison, DesignAudit, Dose, Family, Intervals, LossCases, Method, OverallMethod, RankRow,
+    Sign, Statistics, Units, Verdict, span,
 };
 use crate::study::named;
 use mirrorstats_exact::chance::with_strategy;
@@ -29,6 +30,7 @@ const CANNOT_SAY: &str = "cannot say";
 
 /// Rates with Wilson's interval; also the other two if `is_full`.
 pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
+    let title = if is_full { "intervals" } else { "score intervals (Wilson)" };
     let of_rate = |intervals| match intervals {
         Intervals::Rate { wilson, clopper_pearson, jeffreys } => Some([wilson, clopper_pearson, jeffreys]),
         Intervals::Quantity { .. } => None,
@@ -42,9 +44,12 @@ pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Tab
         .number_if(is_full, "Clopper-Pearson", |(_, found)| plain(found[1], 3))
         .number_if(is_full, "Jeffreys", |(_, found)| plain(found[2], 3))
         .left_out(statistics)
+        .titled(format!("Rates, {} {title}", percent(statistics.confidence)))
 }
 
 pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
+    let percent = percent(statistics.confidence);
+    let title = format!("Quantities, {percent} intervals of the plain mean: Student's t, seeded BCa bootstrap");
     let of_quantity = |intervals| match intervals {
         Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } => {
             Some([(student_t, student_t_withheld), (bootstrap, bootstrap_withheld)])
@@ -58,6 +63,7 @@ pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
         .number("Student's t", |(_, [(interval, withheld), _])| held(*interval, *withheld, 2))
         .number("bootstrap", |(_, [_, (interval, withheld)])| held(*interval, *withheld, 2))
         .left_out(statistics)
+        .titled(title)
 }
 
 impl<'s, I> TextTable<(&'s CellRow, I)> {
@@ -88,6 +94,7 @@ fn mark(cell: &CellRow) -> String {
 /// rows that repeat others: a lower level of the same role, the same count among finished episodes, and families
 /// without any verdict, which the answers name.
 pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
+    let mid_p = if is_full { "; mid-p need not keep the level" } else { "" };
     let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
     let has_losses = statistics.chance.iter().any(|row| row.losses.is_some());
     let is_new = |row: &ChanceRow| {
@@ -119,6 +126,9 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Ta
             verdict => verdict.name(),
         })
         .table()
+        .titled(format!(
+            "Against chance: exact binomial test, two-sided by minimum likelihood; Holm over the models{mid_p}"
+        ))
 }
 
 /// A count of episodes, with the mean over units where the test uses that.
@@ -165,6 +175,14 @@ impl<R> TextTable<R> {
 }
 
 pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
+    let is_permuted = statistics.models.iter().flat_map(Family::comparisons).any(|found| found.p_error.is_some());
+    let by_permutation = if is_permuted { ", also by permutation at unequal n" } else { "" };
+    let title = format!(
+        "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
+         episodes), t tests of restricted means{by_permutation}; Holm over all pairs; {} intervals (Newcombe) not \
+         adjusted",
+        percent(statistics.confidence)
+    );
     let tests = statistics.models.iter().flat_map(|family| family.tests.iter().map(move |test| (family, test)));
     let all = tests.clone().map(|(_, test)| &test.comparison);
     TextTable::of(tests.filter(|(family, test)| shown(&family.metric) && test.comparison.separated))
@@ -174,6 +192,7 @@ pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) ->
         .text("than", |(_, test)| test.second.clone())
         .comparison(all, is_full, |(_, test)| &test.comparison)
         .table()
+        .titled(title)
 }
 
 pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
@@ -192,6 +211,11 @@ pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -
             None => UNDEFINED,
         })
         .table()
+        .titled(format!(
+            "Between conditions: first experiment minus the other, by the same methods; Holm over the models; {} \
+             intervals not adjusted",
+            percent(statistics.confidence)
+        ))
 }
 
 pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
@@ -217,6 +241,7 @@ pub(super) fn trends(statistics: &Statistics, shown: Shown) -> Table {
             (.., Verdict::NotSeparated) => "no trend shown".to_owned(),
         })
         .table()
+        .titled("Rates against a dose: Cochran-Armitage test within each scene or other unit (Mantel 1963); Holm over the models")
 }
 
 fn counts(found: &Comparison) -> String {
@@ -278,6 +303,12 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
             _ => "not told apart",
         })
         .table()
+        .titled(format!(
+            "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
+             {} interval, McNemar's over the pairs of all, or permutation by scene or cluster; two-sided by minimum \
+             likelihood; Holm over all pairs",
+            percent(statistics.confidence)
+        ))
 }
 
 pub(super) fn design(audit: &DesignAudit) -> Table {
@@ -293,8 +324,7 @@ pub(super) fn design(audit: &DesignAudit) -> Table {
         .number("unfinished", |cell| cell.unfinished.map_or_else(|| UNDEFINED.to_owned(), |count| count.to_string()))
         .number("after steps", |cell| match cell.unfinished_steps {
             None => UNDEFINED.to_owned(),
-            Some([first, last]) if first == last => first.to_string(),
-            Some([first, last]) => format!("{first} to {last}"),
+            Some([first, last]) => span(first, last),
         })
         .table()
 }
@@ -338,6 +368,11 @@ pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Table {
         .number("probability", |row| fixed(Some(row.improvement.probability), 3))
         .number("interval", |row| plain(row.improvement.interval, 3))
         .table()
+        .titled(format!(
+            "How often one model decides earlier than another, averaged over experiments; who never decides is the \
+             latest; stratified bootstrap, {} percentile intervals",
+            percent(statistics.confidence)
+        ))
 }
 
 pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Table {
@@ -356,6 +391,7 @@ pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Table {
         .number("ICC", |(row, _)| fixed(row.by_seed.and_then(|found| found.icc), 2))
         .number("design effect", |(row, _)| fixed(row.by_seed.and_then(|found| found.design_effect), 2))
         .table()
+        .titled("By seed: cluster-robust standard errors, t(seeds - 1), of rates on the log-odds scale")
 }
 
 pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Table {
@@ -372,9 +408,16 @@ pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Table {
         .number("interval", |row| held(row.restricted.and_then(|found| found.interval), row.withheld, 2))
         .number("up to", |row| row.restricted.map_or_else(|| UNDEFINED.to_owned(), |found| found.horizon.to_string()))
         .table()
+        .titled(format!(
+            "Durations: unfinished episodes censored (Kaplan-Meier); medians by Brookmeyer and Crowley, restricted \
+             means on the log-odds scale, {} intervals",
+            percent(statistics.confidence)
+        ))
 }
 
 pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Table {
+    let percent = percent(statistics.confidence);
+    let title = format!("Time to a correct decision: a wrong one competes (Aalen-Johansen); {percent} intervals");
     let rows = statistics.durations.iter().filter(|row| shown(&row.metric));
     TextTable::of(rows.filter_map(|row| Some((row, row.correct.as_ref()?))))
         .cell(|(row, _)| (&row.key, &row.metric))
@@ -385,6 +428,7 @@ pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Table {
         .number("interval", |(_, found)| held(found.restricted.interval, found.withheld, 2))
         .number("up to", |(_, found)| found.restricted.horizon)
         .table()
+        .titled(title)
 }
 
 pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
@@ -397,6 +441,7 @@ pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
         .number("variance by scene", |row| fixed(row.between_scenes, 3))
         .number("by repeat", |row| fixed(row.within_scenes, 3))
         .table()
+        .titled("The same scene played again: verdicts that differ by chance alone, which a difference has to exceed")
 }
 
 pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Table {
@@ -407,6 +452,7 @@ pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Table {
         .number("bounds", |row| plain(Some(row.lossy.bounds), 3))
         .number("interval around the bounds", |row| plain(Some(row.lossy.interval), 3))
         .table()
+        .titled("Lost to infrastructure")
 }
 
 fn reached(median: Option<i64>) -> String {

@@ -278,7 +278,7 @@ impl<'a> Study<'a> {
     }
 }
 
-impl<'a> Block<'a> {
+impl Block<'_> {
     /// The name in comparisons: `model`, or `model [condition]` if there are several.
     pub fn name(&self) -> String {
         named(self.model, self.condition)

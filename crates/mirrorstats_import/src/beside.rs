@@ -72,7 +72,7 @@ impl Beside {
         if let Some(first) = self.first_missing {
             notes.count(format!("files of steps that are missing, the first `{first}`"), self.missing);
         }
-        let lines: String = self.hashes.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
-        (!lines.is_empty()).then(|| hash::of_bytes(lines.as_bytes()))
+        let lines: Vec<String> = self.hashes.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
+        (!lines.is_empty()).then(|| hash::of_bytes(lines.concat().as_bytes()))
     }
 }

@@ -283,7 +283,7 @@ impl<'m> Rows<'m> {
         if !self.mapping.paths().any(|path| path == POSITION) || rows.column_by_name(POSITION).is_some() {
             return rows.clone();
         }
-        let positions = (self.total..).take(rows.num_rows()).map(|row| row.cast_signed());
+        let positions = (self.total..).take(rows.num_rows()).map(u64::cast_signed);
         let positions: ArrayRef = Arc::new(positions.collect::<Int64Array>());
         let names = rows.schema_ref().fields().iter().map(|field| field.name().clone());
         let columns = names.zip(rows.columns().iter().cloned()).chain([(POSITION.to_owned(), positions)]).collect();

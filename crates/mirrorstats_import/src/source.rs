@@ -18,7 +18,7 @@ pub(super) type Find<'a> = dyn Fn(&str) -> Option<ArrayRef> + 'a;
 pub(super) enum Source {
     Constant(Value),
     Text(Pattern),
-    Value(Path, Change),
+    Value(Path, Box<Change>),
     /// The position within the episode, by an integer or by the order of rows.
     Order(Option<Path>),
 }
@@ -65,13 +65,13 @@ impl Source {
             Change { value: Some(value), from: None, .. } => Ok(Self::Constant(value)),
             Change { from, start: Some(1), .. } => Ok(Self::Order(from.as_deref().map(Path::parse))),
             Change { start: Some(_), .. } => Err("another `start` than 1, with which every trace begins,".to_owned()),
-            Change { from: Some(ref from), .. } => Ok(Self::Value(Path::parse(from), change)),
+            Change { from: Some(ref from), .. } => Ok(Self::Value(Path::parse(from), Box::new(change))),
             Change { .. } => Err("neither `from` nor `value`".to_owned()),
         }
     }
 
     pub(super) fn path(keys: &str) -> Self {
-        Self::Value(Path::parse(keys), Change::default())
+        Self::Value(Path::parse(keys), Box::default())
     }
 
     pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {

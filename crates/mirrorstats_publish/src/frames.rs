@@ -229,12 +229,11 @@ fn write_table(
         if rows.is_empty() {
             continue;
         }
-        let writer = match &mut writer {
-            Some(writer) => writer,
-            None => {
-                let file = File::create(path).map_err(PublishError::file(path))?;
-                writer.insert(ArrowWriter::try_new_with_options(file, Arc::clone(&schema), options()).map_err(failed)?)
-            }
+        let writer = if let Some(writer) = &mut writer {
+            writer
+        } else {
+            let file = File::create(path).map_err(PublishError::file(path))?;
+            writer.insert(ArrowWriter::try_new_with_options(file, Arc::clone(&schema), options()).map_err(failed)?)
         };
         writer.write(&batch(&schema, episode, &rows).map_err(|error| failed(error.into()))?).map_err(failed)?;
     }

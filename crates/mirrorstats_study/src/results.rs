@@ -103,7 +103,9 @@ impl Results {
         let is_kept = |row: &usize| kept.contains(episodes.keys.get(*row).model);
         let rows: Vec<usize> = (0..episodes.len()).filter(is_kept).collect();
         let mut outcomes = self.outcomes.clone();
-        outcomes.iter_mut().for_each(|found| found.rows.retain(|model, _| kept.contains(model.as_str())));
+        if let Some(found) = &mut outcomes {
+            found.rows.retain(|model, _| kept.contains(model.as_str()));
+        }
         Self { outcomes, ..self.taken(&rows) }
     }
 

@@ -3,6 +3,7 @@
 use super::journal::{Journal, JournalError};
 use super::model::{Vlm, tokens};
 use crate::limits::Spend;
+use mirrorstats_experiment::built_in_names;
 
 /// The average answer of finished episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,7 +70,7 @@ fn spent(vlm: &Vlm, slug: &str) -> Result<Spend, JournalError> {
     for entry in entries {
         let path = entry.map_err(failed)?.path();
         let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-        if path.extension().is_none_or(|ending| ending != "jsonl") || model_of(stem) != Some(slug) {
+        if path.extension().is_none_or(|ending| ending != "jsonl") || !is_of_model(stem, slug) {
             continue;
         }
         add_journal(vlm, &Journal::cassette(&path)?, &mut spend);
@@ -97,35 +98,55 @@ fn add_journal(vlm: &Vlm, journal: &Journal, spend: &mut Spend) {
     }
 }
 
-/// The model in the name of an episode's journal: `slug` in `E1-slug-s1-r3`, and in `E1-slug@near-s1-r3-x2`.
-fn model_of(stem: &str) -> Option<&str> {
+/// Returns true if an episode's journal is of this model: `E1-slug-s1-r3`, and `two-mirrors-slug@near-s1-r3-x2`.
+///
+/// Names of experiments and of models may have a `-`: `E1-mini-slug` is of the model `mini-slug`, since `E1` is built in.
+fn is_of_model(stem: &str, slug: &str) -> bool {
     let without_last = |name, mark: char| {
         let (rest, last): (&str, &str) = str::rsplit_once(name, '-')?;
         let number = last.strip_prefix(mark)?;
         (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(rest)
     };
     let first = without_last(stem, 'x').unwrap_or(stem);
-    let (_, subject) = without_last(without_last(first, 'r')?, 's')?.split_once('-')?;
-    Some(subject.split_once('@').map_or(subject, |(model, _)| model))
+    let Some(subject) = without_last(first, 'r').and_then(|rest| without_last(rest, 's')) else { return false };
+    let subject = subject.split_once('@').map_or(subject, |(model, _)| model);
+    let experiment = subject.strip_suffix(slug).and_then(|rest| rest.strip_suffix('-')).filter(|rest| !rest.is_empty());
+    let has_model =
+        |experiment: &str, name: &str| experiment.strip_prefix(name).is_some_and(|rest| rest.starts_with('-'));
+    experiment.is_some_and(|experiment| {
+        let names = built_in_names();
+        names.contains(&experiment) || !names.iter().any(|name| has_model(experiment, name))
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::model_of;
+    use super::is_of_model;
 
     #[test]
     fn a_journal_names_its_model() {
-        for (stem, expected) in [
-            ("E1-gpt-5-1-s1-r3", Some("gpt-5-1")),
-            ("E1-gpt-5-s1-r3-x2", Some("gpt-5")),
-            ("E5-a@near-s1-s2-r10", Some("a")),
-            ("E1-a-s1-r1-s2-r3", Some("a-s1-r1")),
-            ("E1-s2-r3", None),
-            ("E1-a-s2", None),
-            ("notes", None),
-            ("", None),
+        for (stem, model) in [
+            ("E1-gpt-5-1-s1-r3", "gpt-5-1"),
+            ("E1-gpt-5-s1-r3-x2", "gpt-5"),
+            ("E5-a@near-s1-s2-r10", "a"),
+            ("E1-a-s1-r1-s2-r3", "a-s1-r1"),
+            ("two-mirrors-gpt-5-s1-r1", "gpt-5"),
+            ("contingency-late-gpt-5@near-s1-r1", "gpt-5"),
+            ("my-own-room-gpt-5-s1-r1", "gpt-5"),
         ] {
-            assert_eq!(model_of(stem), expected, "{stem}");
+            assert!(is_of_model(stem, model), "{stem}");
+        }
+        for (stem, model) in [
+            ("E1-mini-gpt-5-s1-r1", "gpt-5"),
+            ("two-mirrors-mini-gpt-5-s1-r1", "gpt-5"),
+            ("E1-gpt-5-1-s1-r3", "gpt-5"),
+            ("E1-s2-r3", "E1"),
+            ("E1-a-s2", "a"),
+            ("gpt-5-s1-r1", "gpt-5"),
+            ("notes", "notes"),
+            ("", ""),
+        ] {
+            assert!(!is_of_model(stem, model), "{stem}");
         }
     }
 }

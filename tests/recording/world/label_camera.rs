@@ -83,7 +83,7 @@ fn paint(stage: &mut Stage) {
 
 /// The meaning of a pixel's label, regardless of what a pane shows; `None` for no label.
 fn labelled(frame: &Frame, at: usize) -> Option<Shown> {
-    let number = |part: u8| (part % STEP == 0).then_some(part / STEP);
+    let number = |part: u8| part.is_multiple_of(STEP).then_some(part / STEP);
     let [red, green] = [number(frame.rgb[3 * at])?, number(frame.rgb[3 * at + 1])?];
     match green.checked_sub(1) {
         Some(pane) => (red == 0).then_some(Shown::Through(usize::from(pane), Item::Room)),

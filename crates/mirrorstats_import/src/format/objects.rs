@@ -23,7 +23,7 @@ use mirrorstats_exact::input;
 /// Adds the rows of each line. A bad line does not stop the search for others.
 pub(super) fn read_lines(reader: &mut BufReader<File>, rows: &mut Rows<'_>) -> Result<(), ImportError> {
     (rows.noun, rows.is_strict) = ("line", rows.mapping.is_empty());
-    each_line(reader, rows, |rows, object, line| add(rows, object, line))
+    each_line(reader, rows, add)
 }
 
 fn each_line(
@@ -112,8 +112,8 @@ pub(crate) fn rows_of_table(object: &Value) -> Option<Vec<Value>> {
     if !names.iter().enumerate().all(is_new) || rows.iter().any(|row| row.len() != names.len()) {
         return None;
     }
-    let named = |row: &Vec<Value>| names.iter().map(|name| (*name).to_owned()).zip(row.iter().cloned()).collect();
-    Some(rows.into_iter().map(|row| Value::Object(named(row))).collect())
+    let members = |row: &Vec<Value>| names.iter().map(|name| (*name).to_owned()).zip(row.iter().cloned()).collect();
+    Some(rows.into_iter().map(|row| Value::Object(members(row))).collect())
 }
 
 /// Adds a row for each item of the innermost list. Items have the line of their object, or else are counted.

@@ -133,8 +133,11 @@ pub struct PngFrame {
     pub size: (u32, u32),
 }
 
+/// An episode of a log, and its frames as PNG by their steps.
+type Filmed = (Episode, BTreeMap<i32, Vec<u8>>);
+
 /// An episode of a log, and its frames by t; `None` if the log does not have both.
-fn in_log(path: &Path, id: &str) -> Result<Option<(Episode, BTreeMap<i32, Vec<u8>>)>, ReplayError> {
+fn in_log(path: &Path, id: &str) -> Result<Option<Filmed>, ReplayError> {
     let (mut head, mut end) = (None, None);
     let (mut steps, mut frames) = (Vec::new(), BTreeMap::new());
     for message in LogReader::open(path).map_err(ReplayError::other)? {

@@ -59,7 +59,9 @@ impl Statistics {
         let count = if length == Length::Screen { 1 } else { usize::MAX };
         tied.take(count).for_each(|table| section(&mut text, table, width));
         list(&mut text, "What cannot be concluded", &warnings, width);
-        sections(statistics, &shown, length).into_iter().for_each(|table| section(&mut text, table, width));
+        for table in sections(statistics, &shown, length) {
+            section(&mut text, table, width);
+        }
         let more = match length {
             Length::Screen => "--tables prints the numbers behind the answers; --full also every row and interval.",
             Length::Tables => {

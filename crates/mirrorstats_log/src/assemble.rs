@@ -14,7 +14,9 @@ use super::error::LogError;
 use super::message::EpisodeMessage;
 use super::read::Messages;
 use super::{METADATA, METADATA_KEY, topic};
-use mirrorstats_exact::replace::{NewFile, folder_of};
+use mirrorstats_exact::replace::NewFile;
+#[cfg(feature = "view")]
+use mirrorstats_exact::replace::folder_of;
 use mirrorstats_trace::episodes::episode::Episode;
 
 /// The order of a log's episodes: seed, run and repetition.

@@ -162,6 +162,9 @@ fn settings_before_a_header_are_left_out_by_name() {
         run(at, &["import", "monitor.csv", "--from", "draft.toml", "--definitions", "draft.toml", "-o", "m.parquet"]);
     assert!(answer.stderr.contains("of settings before the header"), "{}", answer.stderr);
     answer.done();
+    fs::write(at.join("monitor.csv"), format!("{log}1\n")).unwrap();
+    let error = run(at, &["import", "monitor.csv", "--from", "draft.toml", "-o", "n.parquet"]).refused();
+    assert!(error.contains("monitor.csv, line 5"), "{error}");
 }
 
 #[test]

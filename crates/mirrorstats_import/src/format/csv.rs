@@ -25,12 +25,13 @@ pub(super) fn read(mut reader: BufReader<File>, rows: &mut Rows<'_>) -> Result<(
     }
     let is_tabbed = header.contains(&b'\t') && !header.contains(&b',');
     let mut reader = ReaderBuilder::new().delimiter(if is_tabbed { b'\t' } else { b',' }).from_reader(reader);
-    let names = reader.headers().map_err(|error| unreadable(rows, &error))?.clone();
+    let names = reader.headers().map_err(|error| unreadable(rows, &error, lines))?.clone();
     if let Some((_, name)) =
         names.iter().enumerate().find(|(at, name)| names.iter().take(*at).any(|other| other == *name))
     {
         let found = format!("`{}` twice", mirrorstats_exact::escape::visible(name));
-        return Err(rows.fault("line 1", "a header with each name once", found, "rename one of the columns"));
+        let line = format!("line {}", lines + 1);
+        return Err(rows.fault(&line, "a header with each name once", found, "rename one of the columns"));
     }
     let mut record = StringRecord::new();
     loop {
@@ -38,7 +39,7 @@ pub(super) fn read(mut reader: BufReader<File>, rows: &mut Rows<'_>) -> Result<(
         let (mut count, mut bytes) = (0, 0);
         while count < BATCH_ROWS
             && bytes < BATCH_BYTES
-            && reader.read_record(&mut record).map_err(|error| unreadable(rows, &error))?
+            && reader.read_record(&mut record).map_err(|error| unreadable(rows, &error, lines))?
         {
             for (column, cell) in columns.iter_mut().zip(&record) {
                 column.append_option(Some(cell).filter(|cell| !cell.is_empty()));
@@ -69,8 +70,8 @@ fn header_of(reader: &mut BufReader<File>) -> io::Result<(Vec<u8>, u64)> {
     }
 }
 
-fn unreadable(rows: &Rows<'_>, error: &Error) -> ImportError {
-    let line = error.position().map(|at| format!("line {}", at.line())).unwrap_or_default();
+fn unreadable(rows: &Rows<'_>, error: &Error, lines_before: u64) -> ImportError {
+    let line = error.position().map(|at| format!("line {}", lines_before + at.line())).unwrap_or_default();
     let help = "write it with commas, quotes around cells with commas, and a header";
     rows.fault(&line, "a record with the cells of the header, in UTF-8", error.to_string(), help)
 }

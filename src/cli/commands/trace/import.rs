@@ -29,7 +29,7 @@ pub struct ImportArgs {
     /// The trace to write
     #[arg(short, long, value_name = "TRACE.parquet", required_unless_present = "guess")]
     out: Option<PathBuf>,
-    /// Draft the mapping and the definitions of one file, with a first table; say what the draft rests on
+    /// Draft the mapping and the definitions of a file or folder, with a first table; say what the draft rests on
     #[arg(long, conflicts_with_all = ["out", "from", "map", "set", "json", "palette", "cluster", "reconstruction"])]
     guess: bool,
     /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file [default: those of the format,
